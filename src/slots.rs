@@ -4,7 +4,7 @@ use crate::error::{Error, Result};
 use crate::frame::Frame;
 use core::hash::{BuildHasherDefault, Hasher};
 use core::ops::Range;
-use splatstream_gaussians::{Planes, sh_coefficients};
+use splatstream_gaussians::{Planes, PlanesRef, sh_coefficients};
 use std::collections::HashMap;
 use std::sync::OnceLock;
 
@@ -251,7 +251,7 @@ fn runs(slots: &[u32]) -> Vec<Run> {
 }
 
 /// Writes Gaussians to their slots, and takes note of those that change.
-fn write(to: &mut Planes, from: &Planes, runs: &[Run], is_dirty: &mut [bool]) {
+fn write(to: &mut Planes, from: PlanesRef<'_>, runs: &[Run], is_dirty: &mut [bool]) {
     for (to, from) in to.iter_mut().zip(from.iter()) {
         for Run { rows, slot } in runs {
             let slots = *slot..slot.saturating_add(rows.len());

@@ -4,7 +4,7 @@
 //! no Gaussian that can never reach an alpha of 1/255.
 
 use rayon::prelude::*;
-use splatstream_gaussians::{GaussianFrame, PlanesMut};
+use splatstream_gaussians::GaussianFrame;
 
 /// The logit below which opacity stays under 1/255: ln(1/254).
 pub const INVISIBLE_LOGIT: f32 = -5.537_334;
@@ -85,7 +85,7 @@ const PART: usize = 1 << 12;
 /// The Gaussians of a frame in canonical form.
 #[must_use]
 pub fn canonicalise(mut frame: GaussianFrame, sort: bool) -> GaussianFrame {
-    let PlanesMut { log_scale, rotation, .. } = frame.planes_mut();
+    let (log_scale, rotation) = frame.axes_mut();
     let [a, b, c] = log_scale.map(|plane| plane.par_chunks_mut(PART));
     let [w, x, y, z] = rotation.map(|plane| plane.par_chunks_mut(PART));
     let parts = (a, b, c, w, x, y, z).into_par_iter();

@@ -29,15 +29,21 @@ pub(crate) fn looking(
     settings: &Settings,
 ) -> Result<Ranking, Error> {
     if ranking.is_blind() {
-        ranking.look_at(&first_frame(source, settings)?);
+        // Views follow from what can be seen, whatever its form.
+        let frame = read_first(source)?;
+        let shown = visible(&frame, settings.keep_invisible);
+        ranking.look_at(&frame.into_selected(&shown));
     }
     Ok(ranking)
 }
 
 /// The first frame as it is coded.
 pub(crate) fn first_frame(source: &mut dyn FrameSource, settings: &Settings) -> Result<GaussianFrame, Error> {
-    let first = source.frame(0).map_err(|source| Error::Source { frame: 0, source })?;
-    Ok(coded_form(first, settings))
+    Ok(coded_form(read_first(source)?, settings))
+}
+
+fn read_first(source: &mut dyn FrameSource) -> Result<GaussianFrame, Error> {
+    source.frame(0).map_err(|source| Error::Source { frame: 0, source })
 }
 
 /// A first frame as it is coded.

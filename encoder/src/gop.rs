@@ -27,6 +27,7 @@ use crate::source::FrameSource;
 use crate::spans::span::{Common, Span};
 use crate::writer::GopSink;
 use group::Gop;
+use rayon::prelude::*;
 use splatstream_format::payload::write_frame;
 use splatstream_format::syntax::{
     FrameHeader, FrameRole, FrameType, GopHeader, Profile, UnitHeader, UnitId, UnitType,
@@ -297,8 +298,11 @@ impl<'a> SpanCoder<'a> {
             Isolated::add(found, &mut self.report.isolated);
             Isolated::add(isolated::positions(&frame, &rows, &grid, number), &mut self.report.isolated);
         }
-        let position = [0, 1, 2]
-            .map(|axis: usize| frame.position()[axis].iter().map(|&value| grid.steps(axis, value)).collect());
+        let steps = |axis: usize| {
+            let plane = frame.position()[axis].par_iter();
+            plane.map(|&value| grid.steps(axis, value)).collect()
+        };
+        let position = [0, 1, 2].map(steps);
         Ok(Target { frame, position, rows, row_count, digest })
     }
 

@@ -2,7 +2,7 @@
 
 use crate::colour::{self, ShPlan};
 use crate::error::Error;
-use crate::grid::{Geometry, geometry};
+use crate::grid::sizes;
 use crate::pca::Components;
 use crate::refinements::parts;
 use crate::report::Report;
@@ -144,7 +144,7 @@ fn sh_exponents(
     sequence: &SequenceParameters,
     settings: &Settings,
 ) -> Vec<u8> {
-    let Geometry { log_scale, opacity, .. } = geometry(frame, sequence);
+    let (log_scale, opacity) = sizes(frame, sequence);
     let mut refinements = vec![0; frame.len()];
     let mut rules = Vec::new();
     for (refinement, part) in (0..).zip(parts(&settings.refinements, order.len())) {

@@ -120,10 +120,7 @@ pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters) -> 
     for (axis, (plane, values)) in position.iter_mut().zip(frame.position()).enumerate() {
         *plane = values.par_iter().map(|&value| grid.code(axis, value)).collect();
     }
-    let (offset, step) = (sequence.log_scale_offset(), sequence.log_scale_step());
-    let log_scale = frame.log_scale().each_ref().map(|plane| parts(plane, offset, step));
-    let (offset, step) = (sequence.opacity_offset(), sequence.opacity_step());
-    let opacity = parts(frame.opacity_logit(), offset, step);
+    let (log_scale, opacity) = sizes(frame, sequence);
     let [_, x, y, z] = frame.rotation();
     let rotation = [x, y, z].map(|plane| {
         let mut turned = parts(plane, 0.0, sequence.rotation_step());
@@ -137,6 +134,14 @@ pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters) -> 
         turned
     });
     Geometry { position, log_scale, opacity, rotation }
+}
+
+/// Log-scales and opacities of such a frame.
+pub(crate) fn sizes(frame: &GaussianFrame, sequence: &SequenceParameters) -> ([Vec<i32>; 3], Vec<i32>) {
+    let (offset, step) = (sequence.log_scale_offset(), sequence.log_scale_step());
+    let log_scale = frame.log_scale().each_ref().map(|plane| parts(plane, offset, step));
+    let (offset, step) = (sequence.opacity_offset(), sequence.opacity_step());
+    (log_scale, parts(frame.opacity_logit(), offset, step))
 }
 
 /// Values in parts of a step. In reach they are below 2^21.
@@ -164,9 +169,9 @@ pub(crate) fn check_reach(
             steps > most || steps.is_nan()
         };
         let out = || rows.iter().copied().filter(is_out);
-        let (first, farthest) =
-            (out().next(), out().max_by(|&a, &b| value(a).abs().total_cmp(&value(b).abs())));
-        let (Some(first), Some(farthest)) = (first, farthest) else { return Ok(()) };
+        let Some(first) = out().next() else { return Ok(()) };
+        let by_magnitude = |&a: &u32, &b: &u32| value(a).abs().total_cmp(&value(b).abs());
+        let farthest = out().max_by(by_magnitude).unwrap_or(first);
         Err(Error::OutOfGrid {
             frame: number,
             attribute,
@@ -178,13 +183,14 @@ pub(crate) fn check_reach(
             farthest: value(farthest),
         })
     };
-    for plane in frame.position() {
-        check("position", plane, 1.0, MAX_POSITION)?;
-    }
-    for plane in frame.log_scale() {
-        check("log_scale", plane, log_scale_step, MAX_LOG_SCALE)?;
-    }
-    check("opacity", frame.opacity_logit(), opacity_step, MAX_OPACITY)
+    let positions = frame.position().iter().map(|plane| ("position", plane.as_slice(), 1.0, MAX_POSITION));
+    let sizes = frame.log_scale().iter();
+    let sizes = sizes.map(|plane| ("log_scale", plane.as_slice(), log_scale_step, MAX_LOG_SCALE));
+    let opacity = ("opacity", frame.opacity_logit(), opacity_step, MAX_OPACITY);
+    let planes: Vec<_> = positions.chain(sizes).chain([opacity]).collect();
+    let checked: Vec<Result<(), Error>> =
+        planes.into_par_iter().map(|(name, plane, step, most)| check(name, plane, step, most)).collect();
+    checked.into_iter().collect()
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Which Gaussians come first.
 
-use crate::frame::visible_difference::pixel;
+use crate::frame::visible_difference::Pixels;
 use crate::settings::{Importance, Preset, Settings};
 use crate::verification::HEIGHT;
 use rayon::prelude::*;
@@ -121,14 +121,13 @@ impl Ranking {
     }
 
     fn ranked(&mut self, frame: &GaussianFrame) -> Ranked {
-        let volume = importance::opacity_volume(frame);
         if self.importance == Importance::Volume {
-            return Ranked { order: importance::order(&volume), ..Ranked::default() };
+            return Ranked { order: importance::order(&importance::opacity_volume(frame)), ..Ranked::default() };
         }
         self.cameras(frame);
         let by = |shown: &[Worth], score: fn(&Worth) -> f64| {
             let scores: Vec<f64> = shown.iter().map(score).collect();
-            ranked(&scores, &volume, &all(frame.len()))
+            ranked(&scores, frame, &all(frame.len()))
         };
         if self.importance == Importance::Footprint {
             let (shown, level) = self.unhidden(frame);
@@ -137,7 +136,7 @@ impl Ranking {
         let views = self.views(frame);
         let shown = views.worth();
         let order = match self.importance {
-            Importance::Removal => self.eliminate(views, &volume, &shown),
+            Importance::Removal => self.eliminate(views, frame, &shown),
             _ => by(&shown, |worth| worth.contribution),
         };
         Ranked { order, shown, level: self.level() }
@@ -212,8 +211,8 @@ impl Ranking {
     /// One look at the whole frame would keep none of two Gaussians that hide each other's loss. The score is the
     /// geometric mean of what a Gaussian gives and what is lost without it: the loss alone takes no account of what
     /// goes at the same time, the contribution alone none of how alike things look.
-    fn eliminate(&self, mut views: SmallViews, volume: &[f64], whole: &[Worth]) -> Vec<u32> {
-        let count = volume.len();
+    fn eliminate(&self, mut views: SmallViews, frame: &GaussianFrame, whole: &[Worth]) -> Vec<u32> {
+        let count = frame.len();
         let mut kept = all(count);
         let mut gone: Vec<u32> = Vec::new();
         for &percent in &self.rounds {
@@ -226,7 +225,7 @@ impl Ranking {
                 }
             };
             let scores: Vec<f64> = of_kept.iter().map(|w| (w.contribution * w.loss).sqrt()).collect();
-            kept = ranked(&scores, volume, &kept);
+            kept = ranked(&scores, frame, &kept);
             let going = kept.split_off(prefix_length(percent, count as u32) as usize);
             gone = going.into_iter().chain(gone).collect();
         }
@@ -282,32 +281,51 @@ fn of_pixels(pixels: f64) -> f64 {
 pub(crate) fn unhidden(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
     let lines = cameras.iter().map(|camera| camera.height as f32).sum::<f32>() / cameras.len().max(1) as f32;
     let filter = LOW_PASS * (lines / HEIGHT as f32).powi(2);
-    let of_row = |row: usize| {
-        let mut scales = frame.log_scale().each_ref().map(|plane| plane[row]);
-        scales.sort_unstable_by(f32::total_cmp);
-        let pixel = pixel(frame, row, cameras).max(f32::MIN_POSITIVE);
-        let [across, along] = [scales[1], scales[2]].map(|scale| libm::expf(2.0 * scale) / (pixel * pixel));
+    let of_row = |(row, pixel): (usize, &f32)| {
+        let [a, b, c] = frame.log_scale().each_ref().map(|plane| plane[row]);
+        let largest = a.max(b).max(c);
+        let middle = a.max(b).min(a.min(b).max(c));
+        let pixel = pixel.max(f32::MIN_POSITIVE);
+        let [across, along] = [middle, largest].map(|scale| libm::expf(2.0 * scale) / (pixel * pixel));
         let area = ((across + filter) * (along + filter)).sqrt();
         let kept = if frame.antialiased() { (across * along).sqrt() / area } else { 1.0 };
         let opacity = kept / (1.0 + libm::expf(-frame.opacity_logit()[row]));
         let [contribution, energy] = [opacity * area, opacity * opacity * area].map(f64::from);
         Worth { contribution, loss: energy, energy }
     };
-    (0..frame.len()).into_par_iter().map(of_row).collect()
+    let arch = pulp::Arch::new();
+    let mut shown = vec![Worth::default(); frame.len()];
+    shown.par_chunks_mut(AT_ONCE).enumerate().for_each(|(chunk, shown)| {
+        let first = chunk * AT_ONCE;
+        let position = frame.position().each_ref().map(|plane| &plane[first..first + shown.len()]);
+        let mut pixels = [0.0; AT_ONCE];
+        let pixels = &mut pixels[..shown.len()];
+        arch.dispatch(Pixels { position, cameras, pixels });
+        let rows = (first..).zip(&*pixels);
+        shown.iter_mut().zip(rows).for_each(|(shown, row)| *shown = of_row(row));
+    });
+    shown
 }
+
+/// Gaussians that are looked at together.
+const AT_ONCE: usize = 1 << 10;
 
 fn all(count: usize) -> Vec<u32> {
     (0..count as u32).collect()
 }
 
-/// `gaussians` by falling score; those that no view tells apart by opacity times volume. `scores` go with
-/// `gaussians`, `volume` with the frame.
+/// `gaussians` of a frame by falling score; those that no view tells apart by opacity times volume. `scores` go with
+/// `gaussians`.
 #[expect(clippy::indexing_slicing, reason = "rows are those of the frame; windows have two entries")]
-fn ranked(scores: &[f64], volume: &[f64], gaussians: &[u32]) -> Vec<u32> {
+fn ranked(scores: &[f64], frame: &GaussianFrame, gaussians: &[u32]) -> Vec<u32> {
+    let volume = |row: u32| {
+        let log_scale = frame.log_scale().each_ref().map(|plane| plane[row as usize]);
+        importance::opacity_volume_of(log_scale, frame.opacity_logit()[row as usize])
+    };
     let mut rows: Vec<(f64, u32)> = scores.iter().copied().zip(gaussians.iter().copied()).collect();
     rows.par_sort_unstable_by(|a, b| {
-        let volumes = volume[b.1 as usize].total_cmp(&volume[a.1 as usize]);
-        b.0.total_cmp(&a.0).then(volumes).then(a.1.cmp(&b.1))
+        let volumes = || volume(b.1).total_cmp(&volume(a.1));
+        b.0.total_cmp(&a.0).then_with(volumes).then(a.1.cmp(&b.1))
     });
     rows.into_iter().map(|(_, gaussian)| gaussian).collect()
 }
@@ -363,6 +381,10 @@ mod tests {
 
     #[test]
     fn ties_go_by_volume_and_then_by_place() {
-        assert_eq!(ranked(&[0.0, 2.0, 0.0, 0.0], &[1.0, 0.0, 5.0, 1.0], &[0, 1, 2, 3]), [1, 2, 0, 3]);
+        let mut frame = BuiltinScene { gaussians: 4, ..BuiltinScene::default() }.frame(0);
+        let PlanesMut { log_scale, opacity_logit, .. } = frame.planes_mut();
+        opacity_logit.fill(0.0);
+        log_scale.into_iter().for_each(|plane| plane.copy_from_slice(&[0.0, -3.0, 1.0, 0.0]));
+        assert_eq!(ranked(&[0.0, 2.0, 0.0, 0.0], &frame, &[0, 1, 2, 3]), [1, 2, 0, 3]);
     }
 }

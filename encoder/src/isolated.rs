@@ -1,6 +1,7 @@
 //! Absurd values: taken for the nearest that are sensible, so that one Gaussian spoils nothing else, and reported.
 
 use crate::grid::{MAX_COLOUR, PositionGrid};
+use rayon::prelude::*;
 use splatstream_gaussians::{GaussianFrame, PlanesMut};
 use std::cmp::Ordering;
 
@@ -63,7 +64,10 @@ pub(crate) fn colours(
     number: u32,
 ) -> (GaussianFrame, Option<Isolated>) {
     let is_out = |value: &f32| value.abs() > MAX_COLOUR;
-    if !frame.dc().iter().chain(frame.sh()).flatten().any(is_out) {
+    // In whole vectors: hardly any frame has such colours.
+    let all_are_in = |values: &[f32]| !values.iter().fold(false, |any, value| any | is_out(value));
+    let planes: Vec<&Vec<f32>> = frame.dc().iter().chain(frame.sh()).collect();
+    if planes.par_iter().all(|plane| all_are_in(plane)) {
         return (frame, None);
     }
     let value = |row: usize| {
@@ -94,7 +98,8 @@ pub(crate) fn positions(
         let values = [0, 1, 2].map(|axis: usize| frame.position()[axis][row]);
         (0..3).find(|&axis| grid.is_beyond(axis, values[axis])).map(|axis| (row, values[axis]))
     };
-    Isolated::of("position", number, (0..frame.len()).filter_map(far).map(|(row, value)| (rows[row], value)))
+    let found: Vec<(usize, f32)> = (0..frame.len()).into_par_iter().filter_map(far).collect();
+    Isolated::of("position", number, found.into_iter().map(|(row, value)| (rows[row], value)))
 }
 
 fn by_magnitude(a: &f32, b: &f32) -> Ordering {

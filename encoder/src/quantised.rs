@@ -90,7 +90,7 @@ impl<'a> Trial<'a> {
     /// # Errors
     /// Planes that make no frame.
     pub(crate) fn decoded(&self, attributes: &[Attribute]) -> Result<GaussianFrame, Error> {
-        let mut planes = self.frame.planes().clone();
+        let mut planes = self.frame.clone().into_planes();
         for attribute in attributes {
             match attribute {
                 Attribute::Position => self.positions(&mut planes),

@@ -149,9 +149,9 @@ pub(crate) fn biases(
         if section != Section::New || info.alphabet != Alphabet::Attribute {
             return 0;
         }
-        let values = || parts.iter().filter_map(|part| part.planes.get(plane)).flatten();
-        let count = values().count().max(1) as i64;
-        let sum: i64 = values().map(|&value| i64::from(value)).sum();
+        let planes = || parts.iter().filter_map(|part| part.planes.get(plane));
+        let count = planes().map(Vec::len).sum::<usize>().max(1) as i64;
+        let sum: i64 = planes().map(|plane| plane.iter().map(|&value| i64::from(value)).sum::<i64>()).sum();
         (2 * sum + count).div_euclid(2 * count) as i32
     };
     layout.planes().par_iter().enumerate().map(mean).collect()

@@ -103,12 +103,12 @@ impl<'a> Latent<'a> {
     /// # Errors
     /// None of planes that are those of a frame.
     pub(super) fn frame(&self) -> Result<GaussianFrame, Error> {
-        let mut planes = self.source.planes().clone();
+        let mut planes = self.source.clone().into_planes();
         let (offsets, steps) = (self.offsets.planes(), &self.steps);
         let shapes = planes.position.iter_mut().chain(&mut planes.log_scale);
         let shapes = shapes.chain(&mut planes.rotation).chain([&mut planes.opacity_logit]);
-        let moves = offsets.position.iter().chain(&offsets.log_scale).chain(&offsets.rotation);
-        let moves = moves.chain([&offsets.opacity_logit]);
+        let moves = offsets.position.iter().chain(offsets.log_scale).chain(offsets.rotation);
+        let moves = moves.chain([offsets.opacity_logit]);
         let sizes = steps.position.iter().chain(&steps.log_scale).chain(&steps.rotation);
         let sizes = sizes.chain([&steps.opacity_logit]);
         for ((plane, offsets), steps) in shapes.zip(moves).zip(sizes) {
@@ -117,7 +117,7 @@ impl<'a> Latent<'a> {
         }
         let colours = [
             (planes.dc.as_mut_slice(), offsets.dc.as_slice(), steps.dc.as_slice()),
-            (planes.sh.as_mut_slice(), offsets.sh.as_slice(), steps.sh.as_slice()),
+            (planes.sh.as_mut_slice(), offsets.sh, steps.sh.as_slice()),
         ];
         for (transform, (planes, offsets, steps)) in self.transforms().into_iter().zip(colours) {
             let Some(transform) = transform else { continue };

@@ -75,7 +75,7 @@ impl Deviation {
         let of = |plane: &[f32]| -> Vec<f32> {
             parents.iter().map(|parent| parent.map_or(0.0, |parent| plane[parent as usize])).collect()
         };
-        let mut planes = self.values.planes().clone();
+        let mut planes = self.values.clone().into_planes();
         planes.iter_mut().for_each(|plane| *plane = of(plane));
         let values = GaussianFrame::from_planes(self.values.sh_degree(), planes)?;
         Ok(Self { position: self.position.each_ref().map(|plane| of(plane)), values })

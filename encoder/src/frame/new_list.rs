@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::Section;
 use splatstream_format::entropy::in_force::ModelsInForce;
+use std::collections::BTreeMap;
 
 /// The new Gaussians of a list.
 pub(crate) struct NewList {
@@ -36,11 +37,17 @@ impl NewList {
         };
         let placed: Vec<(Vec<u32>, SectionValues, Grain)> = added.into_par_iter().map(place).collect();
         let layout = coder.layout(Section::New);
+        // Lists with equal steps have one bias, so that a unit may use the models of the one before.
+        let mut biases_of_steps = BTreeMap::new();
+        for (_, _, Grain { attribute_step, .. }) in &placed {
+            biases_of_steps.entry(*attribute_step).or_insert_with(|| {
+                let alike = placed.iter().filter(|(_, _, other)| other.attribute_step == *attribute_step);
+                let alike: Vec<&SectionValues> = alike.map(|(_, values, _)| values).collect();
+                biases(Section::New, &layout, &alike, models, &coder.plan)
+            });
+        }
         let draft = |(_, values, grain): &(Vec<u32>, SectionValues, Grain)| {
-            // Lists with equal steps have one bias, so that a unit may use the models of the one before.
-            let alike = placed.iter().filter(|(_, _, other)| other.attribute_step == grain.attribute_step);
-            let alike: Vec<&SectionValues> = alike.map(|(_, values, _)| values).collect();
-            let biases = biases(Section::New, &layout, &alike, models, &coder.plan);
+            let biases = biases_of_steps.get(&grain.attribute_step).cloned().unwrap_or_default();
             let steps = coder.steps(grain.attribute_step);
             SectionDraft::new(layout.clone(), values, biases, steps, &coder.plan)
         };

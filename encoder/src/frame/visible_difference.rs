@@ -7,6 +7,7 @@
 
 use super::axis_matching::Pose;
 use crate::canonical::product;
+use pulp::{Simd, WithSimd};
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use splatstream_render::rasterise::LOW_PASS;
@@ -117,9 +118,38 @@ fn turned([w, x, y, z]: [f32; 4], d: [f32; 3]) -> [f32; 3] {
 
 /// The side of a pixel at the place of a Gaussian, scene units; the mean of the cameras.
 pub(crate) fn pixel(frame: &GaussianFrame, row: usize, cameras: &[Camera]) -> f32 {
-    let side = |camera: &Camera| {
-        let apart = [0, 1, 2].map(|axis: usize| frame.position()[axis][row] - camera.position[axis]);
-        apart.iter().map(|d| d * d).sum::<f32>().sqrt() / camera.focal[0].max(f32::MIN_POSITIVE)
-    };
-    cameras.iter().map(side).sum::<f32>() / cameras.len().max(1) as f32
+    let mut pixel = [0.0];
+    add_pixels(frame.position().each_ref().map(|plane| &plane[row..=row]), cameras, &mut pixel);
+    pixel[0]
+}
+
+/// The same of Gaussians at these places: in whole vectors, on every machine the same.
+pub(crate) struct Pixels<'a> {
+    pub(crate) position: [&'a [f32]; 3],
+    pub(crate) cameras: &'a [Camera],
+    /// Become the sides.
+    pub(crate) pixels: &'a mut [f32],
+}
+
+impl WithSimd for Pixels<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        add_pixels(self.position, self.cameras, self.pixels);
+    }
+}
+
+#[inline(always)]
+fn add_pixels([x, y, z]: [&[f32]; 3], cameras: &[Camera], pixels: &mut [f32]) {
+    pixels.fill(0.0);
+    for Camera { position: [from_x, from_y, from_z], focal: [focal, _], .. } in cameras {
+        let focal = focal.max(f32::MIN_POSITIVE);
+        for (((pixel, x), y), z) in pixels.iter_mut().zip(x).zip(y).zip(z) {
+            let [x, y, z] = [x - from_x, y - from_y, z - from_z];
+            *pixel += (x * x + y * y + z * z).sqrt() / focal;
+        }
+    }
+    let count = cameras.len().max(1) as f32;
+    pixels.iter_mut().for_each(|pixel| *pixel /= count);
 }

@@ -51,6 +51,47 @@ impl PlanesMut<'_> {
     }
 }
 
+/// The values of a [`GaussianFrame`], to be read; the planes are those of [`Planes`].
+#[derive(Clone, Copy, Debug)]
+pub struct PlanesRef<'a> {
+    /// Centres.
+    pub position: &'a [Vec<f32>; 3],
+    /// Natural log of the semi-axes.
+    pub log_scale: &'a [Vec<f32>; 3],
+    /// Quaternions w, x, y, z.
+    pub rotation: &'a [Vec<f32>; 4],
+    /// Opacity before the sigmoid.
+    pub opacity_logit: &'a Vec<f32>,
+    /// DC coefficients.
+    pub dc: &'a [Vec<f32>; 3],
+    /// Bands 1 and up.
+    pub sh: &'a [Vec<f32>],
+}
+
+impl<'a> PlanesRef<'a> {
+    /// Every plane, in the order of the fields.
+    pub fn iter(self) -> impl Iterator<Item = &'a Vec<f32>> {
+        let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
+        position.iter().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
+    }
+
+    /// Every plane with its PLY name, in PLY's usual order apart from `f_rest_*`, which come in plane order.
+    pub(crate) fn named(self, sh_degree: u8) -> impl Iterator<Item = (String, &'a Vec<f32>)> {
+        let numbered =
+            |prefix: &'static str| move |(at, plane)| (format!("{prefix}{at}"), plane) as (String, &'a Vec<f32>);
+        let rest = move |(plane, values)| (format!("f_rest_{}", rest_index(plane, sh_degree)), values);
+        ["x", "y", "z"]
+            .into_iter()
+            .map(str::to_owned)
+            .zip(self.position)
+            .chain(self.dc.iter().enumerate().map(numbered("f_dc_")))
+            .chain(self.sh.iter().enumerate().map(rest))
+            .chain(std::iter::once(("opacity".to_owned(), self.opacity_logit)))
+            .chain(self.log_scale.iter().enumerate().map(numbered("scale_")))
+            .chain(self.rotation.iter().enumerate().map(numbered("rot_")))
+    }
+}
+
 /// A frame of Gaussians: structure of arrays, equal lengths by construction, `f32`, PLY's domain. A clone shares the
 /// values until either is changed.
 ///
@@ -59,8 +100,32 @@ impl PlanesMut<'_> {
 pub struct GaussianFrame {
     sh_degree: u8,
     antialiased: bool,
-    /// Shared by copies of the frame until one of them changes.
-    planes: Arc<Planes>,
+    // Each shared by copies of the frame until one of them changes it: an encoder turns axes, and neither moves nor colours
+    // Gaussians, whose colours are most of what a frame holds.
+    places: Arc<Places>,
+    axes: Arc<Axes>,
+    colours: Arc<Colours>,
+}
+
+/// Where Gaussians are, and how much of what is behind them they hide.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Places {
+    position: [Vec<f32>; 3],
+    opacity_logit: Vec<f32>,
+}
+
+/// How large they are, and which way they are turned.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Axes {
+    log_scale: [Vec<f32>; 3],
+    rotation: [Vec<f32>; 4],
+}
+
+/// Which colours they have.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Colours {
+    dc: [Vec<f32>; 3],
+    sh: Vec<Vec<f32>>,
 }
 
 /// Why planes do not make a frame.
@@ -139,32 +204,10 @@ impl Planes {
         position.iter_mut().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
     }
 
-    /// Every plane with its PLY name, in PLY's usual order apart from `f_rest_*`, which come in plane order.
-    pub(crate) fn named(&self, sh_degree: u8) -> impl Iterator<Item = (String, &Vec<f32>)> {
-        let numbered =
-            |prefix: &'static str| move |(at, plane)| (format!("{prefix}{at}"), plane) as (String, &Vec<f32>);
-        let rest = move |(plane, values)| (format!("f_rest_{}", rest_index(plane, sh_degree)), values);
-        ["x", "y", "z"]
-            .into_iter()
-            .map(str::to_owned)
-            .zip(&self.position)
-            .chain(self.dc.iter().enumerate().map(numbered("f_dc_")))
-            .chain(self.sh.iter().enumerate().map(rest))
-            .chain(std::iter::once(("opacity".to_owned(), &self.opacity_logit)))
-            .chain(self.log_scale.iter().enumerate().map(numbered("scale_")))
-            .chain(self.rotation.iter().enumerate().map(numbered("rot_")))
-    }
-
-    fn gather(&self, indices: &[u32]) -> Self {
-        let pick = |plane: &Vec<f32>| picked(plane, indices);
-        Self {
-            position: self.position.each_ref().map(pick),
-            log_scale: self.log_scale.each_ref().map(pick),
-            rotation: self.rotation.each_ref().map(pick),
-            opacity_logit: pick(&self.opacity_logit),
-            dc: self.dc.each_ref().map(pick),
-            sh: self.sh.iter().map(pick).collect(),
-        }
+    /// The same to be read.
+    pub(crate) fn to_read(&self) -> PlanesRef<'_> {
+        let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
+        PlanesRef { position, log_scale, rotation, opacity_logit, dc, sh }
     }
 }
 
@@ -191,22 +234,34 @@ impl GaussianFrame {
             return Err(FrameError::ShPlanes { degree: sh_degree, expected, found });
         }
         let rows = planes.position[0].len();
-        if let Some((property, plane)) = planes.named(sh_degree).find(|(_, plane)| plane.len() != rows) {
+        if let Some((property, plane)) = planes.to_read().named(sh_degree).find(|(_, plane)| plane.len() != rows) {
             return Err(FrameError::Length { property, expected: rows, found: plane.len() });
         }
-        Ok(Self { sh_degree, antialiased: false, planes: Arc::new(planes) })
+        Ok(Self::made_of(planes, sh_degree, false))
+    }
+
+    /// Of planes that make a frame.
+    fn made_of(planes: Planes, sh_degree: u8, antialiased: bool) -> Self {
+        let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = planes;
+        Self {
+            sh_degree,
+            antialiased,
+            places: Arc::new(Places { position, opacity_logit }),
+            axes: Arc::new(Axes { log_scale, rotation }),
+            colours: Arc::new(Colours { dc, sh }),
+        }
     }
 
     /// The same Gaussians, rotations at unit length; those without direction stay as they are.
     #[must_use]
     pub fn with_unit_rotations(mut self) -> Self {
-        normalise_rows(&mut Arc::make_mut(&mut self.planes).rotation);
+        normalise_rows(&mut Arc::make_mut(&mut self.axes).rotation);
         self
     }
 
     /// How many Gaussians.
     pub fn len(&self) -> usize {
-        self.planes.opacity_logit.len()
+        self.places.opacity_logit.len()
     }
 
     /// Whether there are none.
@@ -232,42 +287,47 @@ impl GaussianFrame {
 
     /// Centres: x right, y down, z forward.
     pub fn position(&self) -> &[Vec<f32>; 3] {
-        &self.planes.position
+        &self.places.position
     }
 
     /// Natural log of the three semi-axes.
     pub fn log_scale(&self) -> &[Vec<f32>; 3] {
-        &self.planes.log_scale
+        &self.axes.log_scale
     }
 
     /// Unit quaternions: w, x, y, z.
     pub fn rotation(&self) -> &[Vec<f32>; 4] {
-        &self.planes.rotation
+        &self.axes.rotation
     }
 
     /// Opacity before the sigmoid.
     pub fn opacity_logit(&self) -> &[f32] {
-        &self.planes.opacity_logit
+        &self.places.opacity_logit
     }
 
     /// DC coefficients of red, green, blue.
     pub fn dc(&self) -> &[Vec<f32>; 3] {
-        &self.planes.dc
+        &self.colours.dc
     }
 
     /// Planes of bands 1 and up: plane = coefficient × 3 + channel.
     pub fn sh(&self) -> &[Vec<f32>] {
-        &self.planes.sh
+        &self.colours.sh
     }
 
     /// All the planes.
-    pub fn planes(&self) -> &Planes {
-        &self.planes
+    pub fn planes(&self) -> PlanesRef<'_> {
+        let Places { position, opacity_logit } = &*self.places;
+        let Axes { log_scale, rotation } = &*self.axes;
+        let Colours { dc, sh } = &*self.colours;
+        PlanesRef { position, log_scale, rotation, opacity_logit, dc, sh }
     }
 
     /// The values, to be changed; planes keep their number and their length, so that the frame stays one.
     pub fn planes_mut(&mut self) -> PlanesMut<'_> {
-        let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = Arc::make_mut(&mut self.planes);
+        let Places { position, opacity_logit } = Arc::make_mut(&mut self.places);
+        let Axes { log_scale, rotation } = Arc::make_mut(&mut self.axes);
+        let Colours { dc, sh } = Arc::make_mut(&mut self.colours);
         PlanesMut {
             position: position.each_mut().map(Vec::as_mut_slice),
             log_scale: log_scale.each_mut().map(Vec::as_mut_slice),
@@ -278,9 +338,18 @@ impl GaussianFrame {
         }
     }
 
+    /// Log-scales and quaternions (w, x, y, z), to be changed. All other values stay shared with copies of the frame.
+    pub fn axes_mut(&mut self) -> ([&mut [f32]; 3], [&mut [f32]; 4]) {
+        let Axes { log_scale, rotation } = Arc::make_mut(&mut self.axes);
+        (log_scale.each_mut().map(Vec::as_mut_slice), rotation.each_mut().map(Vec::as_mut_slice))
+    }
+
     /// The planes themselves.
     pub fn into_planes(self) -> Planes {
-        Arc::unwrap_or_clone(self.planes)
+        let Places { position, opacity_logit } = Arc::unwrap_or_clone(self.places);
+        let Axes { log_scale, rotation } = Arc::unwrap_or_clone(self.axes);
+        let Colours { dc, sh } = Arc::unwrap_or_clone(self.colours);
+        Planes { position, log_scale, rotation, opacity_logit, dc, sh }
     }
 
     /// The Gaussians at `indices`, in that order; an index may come more than once.
@@ -289,11 +358,17 @@ impl GaussianFrame {
     /// If an index is not below [`GaussianFrame::len`].
     #[must_use]
     pub fn select(&self, indices: &[u32]) -> Self {
-        Self {
-            sh_degree: self.sh_degree,
-            antialiased: self.antialiased,
-            planes: Arc::new(self.planes.gather(indices)),
-        }
+        let pick = |plane: &Vec<f32>| picked(plane, indices);
+        let PlanesRef { position, log_scale, rotation, opacity_logit, dc, sh } = self.planes();
+        let planes = Planes {
+            position: position.each_ref().map(pick),
+            log_scale: log_scale.each_ref().map(pick),
+            rotation: rotation.each_ref().map(pick),
+            opacity_logit: pick(opacity_logit),
+            dc: dc.each_ref().map(pick),
+            sh: sh.iter().map(pick).collect(),
+        };
+        Self::made_of(planes, self.sh_degree, self.antialiased)
     }
 
     /// The same in the frame's own memory, one plane after the other, if nobody else has the frame.
@@ -305,10 +380,10 @@ impl GaussianFrame {
         if indices.iter().copied().eq(0..self.len() as u32) {
             return self;
         }
-        let Self { sh_degree, antialiased, planes } = self;
-        let mut planes = Arc::unwrap_or_clone(planes);
+        let (sh_degree, antialiased) = (self.sh_degree, self.antialiased);
+        let mut planes = self.into_planes();
         planes.iter_mut().for_each(|plane| *plane = picked(plane, indices));
-        Self { sh_degree, antialiased, planes: Arc::new(planes) }
+        Self::made_of(planes, sh_degree, antialiased)
     }
 }
 

@@ -3,19 +3,21 @@
 use crate::activation::sigmoid;
 use crate::frame::GaussianFrame;
 
-/// Opacity times volume of each Gaussian: sigmoid(logit) × exp(Σ log scale), at least 0, in the cube of the
-/// scene's length unit. Equal on every machine for equal input.
-///
-/// Source: the paper's importance score, ρ = σ(α) · exp(Σ s).
+/// Opacity times volume of each Gaussian, as [`opacity_volume_of`] has it.
 pub fn opacity_volume(frame: &GaussianFrame) -> Vec<f64> {
     let [a, b, c] = frame.log_scale();
     let scales = a.iter().zip(b).zip(c);
     let rows = frame.opacity_logit().iter().zip(scales);
-    rows.map(|(&logit, ((&a, &b), &c))| {
-        let volume = libm::exp(f64::from(a) + f64::from(b) + f64::from(c));
-        sigmoid(f64::from(logit)) * volume
-    })
-    .collect()
+    rows.map(|(&logit, ((&a, &b), &c))| opacity_volume_of([a, b, c], logit)).collect()
+}
+
+/// Opacity times volume of a Gaussian: sigmoid(logit) × exp(Σ log scale), at least 0, in the cube of the
+/// scene's length unit. Equal on every machine for equal input.
+///
+/// Source: the paper's importance score, ρ = σ(α) · exp(Σ s).
+pub fn opacity_volume_of([a, b, c]: [f32; 3], logit: f32) -> f64 {
+    let volume = libm::exp(f64::from(a) + f64::from(b) + f64::from(c));
+    sigmoid(f64::from(logit)) * volume
 }
 
 /// The indices of `scores`, highest score first; equal scores in index order. A total order: NaN counts as

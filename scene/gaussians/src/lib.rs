@@ -26,5 +26,5 @@ mod frame;
 mod sh;
 
 pub use defect::{Defect, DefectKind, Defects};
-pub use frame::{FrameError, GaussianFrame, Planes, PlanesMut};
+pub use frame::{FrameError, GaussianFrame, Planes, PlanesMut, PlanesRef};
 pub use sh::{MAX_SH_DEGREE, SH_C0, rest_index, sh_basis, sh_coefficients, sh_planes};

@@ -92,7 +92,7 @@ pub(super) fn another(frame: &GaussianFrame) -> GaussianFrame {
 
 /// A frame with spherical harmonics up to a degree: those above it are dropped, those that it lacks are made.
 pub(super) fn with_degree(frame: &GaussianFrame, degree: u8) -> GaussianFrame {
-    let mut planes = frame.planes().clone();
+    let mut planes = frame.clone().into_planes();
     let mut dice = Dice::new(u64::from(degree));
     planes.sh.truncate(sh_coefficients(degree) * 3);
     while planes.sh.len() < sh_coefficients(degree) * 3 {
