@@ -4,14 +4,13 @@
     reason = "lengths of what is in memory; a rank of a transform is 1 or more"
 )]
 
+use crate::combination::Combination;
 use crate::entropy_cost::entropy_of;
 use crate::grid::nearest_integer;
 use crate::pca::Components;
 use crate::savings::{BIT, Saving, Tool};
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
-use pulp::{Arch, Simd, WithSimd};
-use rayon::prelude::*;
 use splatstream_decoder::steps::step;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::{TransformHeader, TransformKind};
@@ -45,59 +44,19 @@ pub(crate) fn transform(kind: TransformKind, components: &Components, step: f32)
     }
 }
 
-/// Gaussians projected at a time: their planes stay in the second-level cache.
-const TILE: usize = 1 << 12;
-/// Tiles that are there at the same time.
-const TILES: usize = 64;
+/// What makes components, in units of the step, of colours.
+pub(crate) fn forwards(transform: &Transform, step: f32) -> Combination {
+    let scale = 1.0 / (step * UNIT as f32);
+    let mean = |&mean: &i32| (f64::from(mean) * f64::from(step) / FRACTION) as f32;
+    let weights: Vec<Vec<f32>> =
+        transform.rows().map(|row| row.iter().map(|&weight| f32::from(weight) * scale).collect()).collect();
+    let start = vec![0.0; weights.len()];
+    Combination { before: transform.mean.iter().map(mean).collect(), weights, start }
+}
 
 /// Components in units of the step; one plane per component.
-#[expect(clippy::indexing_slicing, reason = "tiles and rows lie within the planes that they are cut from")]
 pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) -> Vec<Vec<f32>> {
-    let means: Vec<f32> =
-        transform.mean.iter().map(|&mean| (f64::from(mean) * f64::from(step) / FRACTION) as f32).collect();
-    let scale = 1.0 / (step * UNIT as f32);
-    let count = planes.first().map_or(0, |plane| plane.len());
-    let arch = Arch::new();
-    let tile = |&start: &usize| -> Vec<Vec<f32>> {
-        let end = count.min(start + TILE);
-        let row = |weights: &[i16]| {
-            let mut sums = vec![0.0_f32; end - start];
-            for ((&weight, plane), &mean) in weights.iter().zip(planes).zip(&means) {
-                let (weight, values) = (f32::from(weight) * scale, &plane[start..end]);
-                arch.dispatch(AddWeighted { weight, values, mean, sums: &mut sums });
-            }
-            sums
-        };
-        transform.rows().map(row).collect()
-    };
-    let mut components: Vec<Vec<f32>> = transform.rows().map(|_| Vec::with_capacity(count)).collect();
-    let starts: Vec<usize> = (0..count).step_by(TILE).collect();
-    for some in starts.chunks(TILES) {
-        let tiles: Vec<Vec<Vec<f32>>> = some.par_iter().map(tile).collect();
-        let each = components.par_iter_mut().enumerate();
-        each.for_each(|(index, plane)| tiles.iter().for_each(|tile| plane.extend_from_slice(&tile[index])));
-    }
-    components
-}
-
-/// Adds what values have beyond a mean, times a weight, to sums: with the vectors of the machine, on every one the same.
-pub(crate) struct AddWeighted<'a> {
-    pub(crate) weight: f32,
-    pub(crate) values: &'a [f32],
-    pub(crate) mean: f32,
-    pub(crate) sums: &'a mut [f32],
-}
-
-impl WithSimd for AddWeighted<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Self { weight, values, mean, sums } = self;
-        for (sum, &value) in sums.iter_mut().zip(values) {
-            *sum += weight * (value - mean);
-        }
-    }
+    forwards(transform, step).of(planes)
 }
 
 /// Drops the last components that round to 0 for every Gaussian, with these steps; at least one stays.

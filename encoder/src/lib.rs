@@ -23,6 +23,7 @@ pub mod canonical;
 mod checked;
 mod clusters;
 mod colour;
+mod combination;
 mod concat;
 mod entropy_cost;
 mod error;

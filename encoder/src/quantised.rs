@@ -5,14 +5,15 @@
 )]
 
 use crate::attribute::Attribute;
-use crate::colour::{self, AddWeighted};
+use crate::colour;
+use crate::combination::{self, Combination, TILE, Tile};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
 use crate::frame::grain::Grains;
 use crate::grid::{Geometry, geometry, nearest_integer};
 use crate::pca::Components;
 use crate::shape::{Shape, nearest_multiple};
-use pulp::Arch;
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use splatstream_decoder::output::Companding;
 use splatstream_decoder::position::refine;
@@ -20,8 +21,8 @@ use splatstream_decoder::steps::{Stage, StepRule, step};
 use splatstream_format::syntax::{SequenceParameters, TransformKind};
 use splatstream_gaussians::{GaussianFrame, Planes};
 
-/// Gaussians whose colours are made together.
-const NEAR: usize = 1 << 11;
+/// Coded values of colours are below this in magnitude.
+const MOST: f32 = 1e6;
 
 /// What some steps make of a scene: the same for all of its views and samples.
 pub(crate) struct Grids<'a> {
@@ -90,60 +91,58 @@ impl<'a> Trial<'a> {
     /// # Errors
     /// Planes that make no frame.
     pub(crate) fn decoded(&self, attributes: &[Attribute]) -> Result<GaussianFrame, Error> {
-        let mut planes = self.frame.clone().into_planes();
-        for attribute in attributes {
-            match attribute {
-                Attribute::Position => self.positions(&mut planes),
-                Attribute::LogScale => {
-                    let (offset, step) = (self.sequence.log_scale_offset(), self.sequence.log_scale_step());
-                    for (axis, plane) in planes.log_scale.iter_mut().enumerate() {
-                        let value = |coded: &Coded| offset + step * coded.shape.log_scale[axis] as f32;
-                        *plane = self.coded.par_iter().map(value).collect();
-                    }
-                }
-                Attribute::Opacity => {
-                    let (offset, step) = (self.sequence.opacity_offset(), self.sequence.opacity_step());
-                    let value = |coded: &Coded| offset + step * coded.shape.opacity as f32;
-                    planes.opacity_logit = self.coded.par_iter().map(value).collect();
-                }
-                Attribute::Rotation => self.rotations(&mut planes),
-                Attribute::Dc => {
-                    for (slot, plane) in planes.dc.iter_mut().zip(self.colours(0)) {
-                        *slot = plane;
-                    }
-                }
-                Attribute::Sh => planes.sh = self.colours(1),
-            }
-        }
+        let has = |attribute| attributes.contains(&attribute);
+        let source = self.frame.planes();
+        let dc = || self.colours(0).try_into().unwrap_or_default();
+        let planes = Planes {
+            position: if has(Attribute::Position) { self.positions() } else { source.position.clone() },
+            log_scale: if has(Attribute::LogScale) { self.log_scales() } else { source.log_scale.clone() },
+            rotation: if has(Attribute::Rotation) { self.rotations() } else { source.rotation.clone() },
+            opacity_logit: if has(Attribute::Opacity) { self.opacities() } else { source.opacity_logit.clone() },
+            dc: if has(Attribute::Dc) { dc() } else { source.dc.clone() },
+            sh: if has(Attribute::Sh) { self.colours(1) } else { source.sh.to_vec() },
+        };
         let frame = GaussianFrame::from_planes(self.frame.sh_degree(), planes)?;
         Ok(frame.with_antialiased(self.frame.antialiased()))
     }
 
-    fn positions(&self, planes: &mut Planes) {
+    fn positions(&self) -> [Vec<f32>; 3] {
         let companding = Companding::new(self.sequence);
         let (offset, step) = (self.sequence.position_offset(), self.sequence.position_step());
-        for (axis, plane) in planes.position.iter_mut().enumerate() {
+        [0, 1, 2].map(|axis: usize| {
             let value = |(coded, &code): (&Coded, &u32)| {
                 let code = refine(code >> coded.position_shift, coded.position_shift);
                 offset[axis] + step * companding.expand(code) as f32
             };
-            *plane = self.coded.par_iter().zip(&self.geometry.position[axis]).map(value).collect();
-        }
+            self.coded.par_iter().zip(&self.geometry.position[axis]).map(value).collect()
+        })
+    }
+
+    fn log_scales(&self) -> [Vec<f32>; 3] {
+        let (offset, step) = (self.sequence.log_scale_offset(), self.sequence.log_scale_step());
+        [0, 1, 2].map(|axis: usize| {
+            let value = |coded: &Coded| offset + step * coded.shape.log_scale[axis] as f32;
+            self.coded.par_iter().map(value).collect()
+        })
+    }
+
+    fn opacities(&self) -> Vec<f32> {
+        let (offset, step) = (self.sequence.opacity_offset(), self.sequence.opacity_step());
+        self.coded.par_iter().map(|coded| offset + step * coded.shape.opacity as f32).collect()
     }
 
     #[expect(clippy::arithmetic_side_effects, reason = "values on a grid times its steps, both clamped")]
-    fn rotations(&self, planes: &mut Planes) {
+    fn rotations(&self) -> [Vec<f32>; 4] {
         let finest = self.sequence.rotation_step();
-        let [w, parts @ ..] = &mut planes.rotation;
-        for (part, values) in parts.iter_mut().zip(self.turns()) {
+        let [x, y, z]: [Vec<f32>; 3] = self.turns().map(|values| {
             let value = |(value, coded): (&i32, &Coded)| finest * (value * step(coded.exponents[0])) as f32;
-            *part = values.par_iter().zip(&self.coded).map(value).collect();
-        }
+            values.par_iter().zip(&self.coded).map(value).collect()
+        });
         let real = |row: usize| {
-            let squares: f32 = parts.iter().map(|plane| plane[row] * plane[row]).sum();
+            let squares: f32 = [&x, &y, &z].iter().map(|plane| plane[row] * plane[row]).sum();
             (1.0 - squares).max(0.0).sqrt()
         };
-        *w = (0..self.coded.len()).into_par_iter().map(real).collect();
+        [(0..self.coded.len()).into_par_iter().map(real).collect(), x, y, z]
     }
 
     /// Coded values of the rotation.
@@ -158,46 +157,47 @@ impl<'a> Trial<'a> {
         if which == 0 { self.sequence.dc_step() } else { self.sequence.sh_step() }
     }
 
-    /// Coded values of dc, 0, or sh, 1.
-    #[expect(clippy::arithmetic_side_effects, reason = "values on a grid times its steps, both clamped")]
-    fn components(&self, which: usize) -> Vec<Vec<i32>> {
+    /// What makes components, in units of the step, of dc, 0, or sh, 1; and the planes of that.
+    fn forwards(&self, which: usize) -> (Combination, Vec<&[f32]>) {
         let step_of = self.colour_step(which);
         let kind = [TransformKind::Dc, TransformKind::Sh][which];
         let transform = colour::transform(kind, &self.bases[which], step_of);
-        let planes: Vec<&[f32]> = match which {
-            0 => self.frame.dc().iter().map(Vec::as_slice).collect(),
-            _ => self.frame.sh().iter().map(Vec::as_slice).collect(),
-        };
+        let planes = if which == 0 { self.frame.dc().as_slice() } else { self.frame.sh() };
+        (colour::forwards(&transform, step_of), planes.iter().map(Vec::as_slice).collect())
+    }
+
+    /// Coded values of dc, 0, or sh, 1.
+    #[expect(clippy::arithmetic_side_effects, reason = "another place of an array")]
+    fn components(&self, which: usize) -> Vec<Vec<i32>> {
+        let (forwards, planes) = self.forwards(which);
         let value = |(&component, coded): (&f32, &Coded)| {
-            let steps = component / step(coded.exponents[1 + which]) as f32;
-            nearest_integer(steps.clamp(-1e6, 1e6))
+            nearest_integer((component / step(coded.exponents[1 + which]) as f32).clamp(-MOST, MOST))
         };
-        let components = colour::components(&transform, &planes, step_of);
+        let components = forwards.of(&planes);
         components.par_iter().map(|plane| plane.iter().zip(&self.coded).map(value).collect()).collect()
     }
 
-    /// Planes of dc, 0, or sh, 1, from their coded values.
-    #[expect(clippy::arithmetic_side_effects, reason = "values on a grid times its steps, both clamped")]
+    /// Planes of dc, 0, or sh, 1, from their coded values: forth, to the nearest steps, and back, as long as values are near.
+    #[expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; another place of an array")]
     fn colours(&self, which: usize) -> Vec<Vec<f32>> {
         let (basis, finest) = (&self.bases[which], self.colour_step(which));
-        let real = |component: &Vec<i32>| -> Vec<f32> {
-            let value = |(value, coded): (&i32, &Coded)| (value * step(coded.exponents[1 + which])) as f32;
-            component.iter().zip(&self.coded).map(value).collect()
+        let (forwards, planes) = self.forwards(which);
+        let weight = |index: usize| basis.rows.iter().map(|row| row[index] as f32 * finest).collect();
+        let backwards = Combination {
+            before: Vec::new(),
+            weights: (0..planes.len()).map(weight).collect(),
+            start: basis.mean.iter().map(|&mean| mean as f32).collect(),
         };
-        let components: Vec<Vec<f32>> = self.components(which).par_iter().map(real).collect();
         let arch = Arch::new();
-        let plane = |index: usize| {
-            let mut plane = vec![basis.mean[index] as f32; self.coded.len()];
-            // Some Gaussians after the others, so that their values are near for all components.
-            for (part, values) in plane.chunks_mut(NEAR).enumerate() {
-                for (row, component) in basis.rows.iter().zip(&components) {
-                    let (weight, own) = (row[index] as f32 * finest, &component[part * NEAR..]);
-                    arch.dispatch(AddWeighted { weight, values: own, mean: 0.0, sums: values });
-                }
-            }
-            plane
-        };
-        (0..components.len()).into_par_iter().map(plane).collect()
+        combination::assembled(self.coded.len(), planes.len(), |first, colours| {
+            let mut components = vec![[0.0; TILE]; planes.len()];
+            forwards.tile(arch, &planes, first, &mut components);
+            let mut steps = [1.0; TILE];
+            let coded = self.coded[first..].iter();
+            steps.iter_mut().zip(coded).for_each(|(to, coded)| *to = step(coded.exponents[1 + which]) as f32);
+            arch.dispatch(Round { steps: &steps, components: &mut components });
+            backwards.sums(arch, &components, colours);
+        })
     }
 
     /// Low bits of positions that are left out, of all Gaussians and axes together.
@@ -219,6 +219,25 @@ impl<'a> Trial<'a> {
             Attribute::Rotation => of_all(&self.turns()),
             Attribute::Dc => of_all(&self.components(0)),
             Attribute::Sh => of_all(&self.components(1)),
+        }
+    }
+}
+
+/// Brings components to the nearest multiples of steps.
+struct Round<'a> {
+    steps: &'a Tile,
+    components: &'a mut [Tile],
+}
+
+impl WithSimd for Round<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for plane in self.components {
+            for (component, step) in plane.iter_mut().zip(self.steps) {
+                *component = nearest_integer((*component / step).clamp(-MOST, MOST)) as f32 * step;
+            }
         }
     }
 }
