@@ -71,7 +71,7 @@ pub use splatstream_decoder::operating_point::{OperatingPoint, ParseOperatingPoi
 pub use splatstream_encoder::{Encoder, Error as EncodeError, FrameSource, Report, Settings, encode};
 /// What is wrong with the bytes of a stream: where, by which clause, and what.
 pub use splatstream_format::{Class, Error as StreamError};
-pub use splatstream_gaussians::{GaussianFrame, Planes};
+pub use splatstream_gaussians::{GaussianFrame, Planes, PlanesRef};
 
 /// What a stream says of its scene.
 pub mod scene {

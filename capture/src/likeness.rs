@@ -56,13 +56,13 @@ impl Likeness {
             let [Some(x), Some(y), Some(z)] = values else { return None };
             Some([x, y, z])
         };
-        let mut log_scales = at(&planes.log_scale)?;
+        let mut log_scales = at(planes.log_scale)?;
         log_scales.sort_unstable_by(f32::total_cmp);
         Some(Self {
-            position: at(&planes.position)?.into(),
+            position: at(planes.position)?.into(),
             log_scales: log_scales.into(),
             opacity_logit: planes.opacity_logit.get(row).copied()?,
-            dc: at(&planes.dc)?.into(),
+            dc: at(planes.dc)?.into(),
         })
     }
 

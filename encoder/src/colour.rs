@@ -60,9 +60,13 @@ pub(crate) fn components(transform: &Transform, planes: &[&[f32]], step: f32) ->
 }
 
 /// Drops the last components that round to 0 for every Gaussian, with these steps; at least one stays.
-pub(crate) fn drop_unused(transform: &mut Transform, planes: &mut Vec<Vec<f32>>, exponents: &[u8]) {
+pub(crate) fn drop_unused(
+    transform: &mut Transform,
+    planes: &mut Vec<Vec<f32>>,
+    exponent: impl Fn(usize) -> u8,
+) {
     let is_used = |plane: &Vec<f32>| {
-        plane.iter().zip(exponents).any(|(value, &exponent)| value.abs() >= 0.5 * step(exponent) as f32)
+        plane.iter().enumerate().any(|(row, value)| value.abs() >= 0.5 * step(exponent(row)) as f32)
     };
     let used = planes.iter().rposition(is_used).map_or(1, |last| last + 1);
     planes.truncate(used);

@@ -101,7 +101,10 @@ pub(crate) fn assembled(
         let parts: Vec<Vec<Vec<f32>>> = some.par_iter().map(part).collect();
         let each = whole.par_iter_mut().enumerate();
         each.for_each(|(index, plane)| {
-            parts.iter().filter_map(|part| part.get(index)).for_each(|values| plane.extend_from_slice(values));
+            parts
+                .iter()
+                .filter_map(|part| part.get(index))
+                .for_each(|values| plane.extend_from_slice(values));
         });
     }
     whole
@@ -113,18 +116,22 @@ mod tests {
 
     #[test]
     fn sums_are_those_of_the_inputs_in_their_order() {
-        let planes: Vec<Vec<f32>> =
-            (0..5).map(|plane| (0..700).map(|row| (row * (plane + 3) % 101) as f32 / 7.0).collect()).collect();
+        let planes: Vec<Vec<f32>> = (0..5)
+            .map(|plane| (0..700).map(|row| (row * (plane + 3) % 101) as f32 / 7.0).collect())
+            .collect();
         let planes: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
         let weights: Vec<Vec<f32>> =
             (0..3).map(|output| (0..5).map(|input| (output * 5 + input) as f32 / 11.0).collect()).collect();
         let combination =
             Combination { before: vec![0.5, -1.0, 2.0, 0.0, 3.25], weights, start: vec![0.0, 1.5, -4.0] };
         let outputs = combination.of(&planes);
-        for (output, (weights, &start)) in outputs.iter().zip(combination.weights.iter().zip(&combination.start)) {
+        for (output, (weights, &start)) in
+            outputs.iter().zip(combination.weights.iter().zip(&combination.start))
+        {
             for row in 0..700 {
                 let terms = weights.iter().zip(&planes).zip(&combination.before);
-                let sum = terms.fold(start, |sum, ((weight, plane), before)| sum + weight * (plane[row] - before));
+                let sum =
+                    terms.fold(start, |sum, ((weight, plane), before)| sum + weight * (plane[row] - before));
                 assert_eq!(output[row].to_bits(), sum.to_bits());
             }
         }

@@ -23,6 +23,7 @@ use crate::isolated::{self, Isolated};
 use crate::matching::{shares_little, shares_much};
 use crate::motion::follow::follow;
 use crate::report::{FrameReport, Report};
+use crate::settings::Structure;
 use crate::source::FrameSource;
 use crate::spans::span::{Common, Span};
 use crate::writer::GopSink;
@@ -302,7 +303,11 @@ impl<'a> SpanCoder<'a> {
             let plane = frame.position()[axis].par_iter();
             plane.map(|&value| grid.steps(axis, value)).collect()
         };
-        let position = [0, 1, 2].map(steps);
+        // Frames by themselves are not matched with others.
+        let position = match self.common.settings.structure {
+            Structure::Intra => Default::default(),
+            Structure::Predicted { .. } => [0, 1, 2].map(steps),
+        };
         Ok(Target { frame, position, rows, row_count, digest })
     }
 

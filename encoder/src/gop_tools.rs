@@ -2,12 +2,12 @@
 
 use crate::colour::{self, ShPlan};
 use crate::error::Error;
-use crate::grid::sizes;
+use crate::grid::size;
 use crate::pca::Components;
 use crate::refinements::parts;
 use crate::report::Report;
 use crate::savings::{Saving, Tool};
-use crate::settings::{Preset, Settings};
+use crate::settings::{Preset, Settings, ShChoice};
 use crate::shape::Shape;
 use rayon::prelude::*;
 use splatstream_decoder::layout::ShCoding;
@@ -63,11 +63,15 @@ impl GopTools {
             };
             let mut transform = colour::transform(TransformKind::Sh, &basis, step);
             let mut components = colour::components(&transform, &planes, step);
-            let exponents = sh_exponents(frame, order, sequence, settings);
+            let exponent = sh_exponent(frame, order, sequence, settings);
             // What the first frame does not need, another may.
             if frames == 1 {
-                colour::drop_unused(&mut transform, &mut components, &exponents);
+                colour::drop_unused(&mut transform, &mut components, &exponent);
             }
+            // The fast preset compares nothing.
+            let compares = settings.preset != Preset::Fast || settings.sh == ShChoice::VectorQuantised;
+            let compared = if compares { frame.len() } else { 0 };
+            let exponents: Vec<u8> = (0..compared).into_par_iter().map(&exponent).collect();
             if settings.tools.sh_transform && settings.preset != Preset::Fast && !frame.is_empty() {
                 worth_of_transform = Some(colour::worth_of_transform(&components, &planes, &exponents, step));
             }
@@ -133,18 +137,17 @@ impl GopTools {
     }
 }
 
-/// The exponents of the steps of SH of an I frame.
+/// The exponent of the steps of SH of each Gaussian of an I frame.
 #[expect(
     clippy::indexing_slicing,
     reason = "rows are those of the frame; an entry of a codebook has `rank` values"
 )]
-fn sh_exponents(
+fn sh_exponent(
     frame: &GaussianFrame,
     order: &[u32],
     sequence: &SequenceParameters,
     settings: &Settings,
-) -> Vec<u8> {
-    let (log_scale, opacity) = sizes(frame, sequence);
+) -> impl Fn(usize) -> u8 + Sync {
     let mut refinements = vec![0; frame.len()];
     let mut rules = Vec::new();
     for (refinement, part) in (0..).zip(parts(&settings.refinements, order.len())) {
@@ -152,12 +155,11 @@ fn sh_exponents(
         rules.push(StepRule::new(sequence, announced));
         order[part].iter().for_each(|&row| refinements[row as usize] = refinement);
     }
-    let exponent = |(row, &refinement): (usize, &u8)| {
-        let rule = &rules[usize::from(refinement)];
-        let wanted = log_scale.each_ref().map(|plane| plane[row]);
-        Shape::new(wanted, opacity[row], rule, sequence.canonical_axes()).exponent(Stage::Sh, rule)
-    };
-    refinements.par_iter().enumerate().map(exponent).collect()
+    move |row| {
+        let rule = &rules[usize::from(refinements[row])];
+        let (log_scale, opacity) = size(frame, row, sequence);
+        Shape::new(log_scale, opacity, rule, sequence.canonical_axes()).exponent(Stage::Sh, rule)
+    }
 }
 
 /// Makes entry 0 of every codebook zero, so that it can stand for "as before".

@@ -120,7 +120,10 @@ pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters) -> 
     for (axis, (plane, values)) in position.iter_mut().zip(frame.position()).enumerate() {
         *plane = values.par_iter().map(|&value| grid.code(axis, value)).collect();
     }
-    let (log_scale, opacity) = sizes(frame, sequence);
+    let (offset, step) = (sequence.log_scale_offset(), sequence.log_scale_step());
+    let log_scale = frame.log_scale().each_ref().map(|plane| parts(plane, offset, step));
+    let (offset, step) = (sequence.opacity_offset(), sequence.opacity_step());
+    let opacity = parts(frame.opacity_logit(), offset, step);
     let [_, x, y, z] = frame.rotation();
     let rotation = [x, y, z].map(|plane| {
         let mut turned = parts(plane, 0.0, sequence.rotation_step());
@@ -136,19 +139,26 @@ pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters) -> 
     Geometry { position, log_scale, opacity, rotation }
 }
 
-/// Log-scales and opacities of such a frame.
-pub(crate) fn sizes(frame: &GaussianFrame, sequence: &SequenceParameters) -> ([Vec<i32>; 3], Vec<i32>) {
-    let (offset, step) = (sequence.log_scale_offset(), sequence.log_scale_step());
-    let log_scale = frame.log_scale().each_ref().map(|plane| parts(plane, offset, step));
-    let (offset, step) = (sequence.opacity_offset(), sequence.opacity_step());
-    (log_scale, parts(frame.opacity_logit(), offset, step))
+/// Log-scales and opacity of one Gaussian of such a frame.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
+pub(crate) fn size(frame: &GaussianFrame, row: usize, sequence: &SequenceParameters) -> ([i32; 3], i32) {
+    let (offset, scale) = (sequence.log_scale_offset(), PARTS / sequence.log_scale_step());
+    let log_scale = frame.log_scale().each_ref().map(|plane| part(plane[row], offset, scale));
+    let (offset, scale) = (sequence.opacity_offset(), PARTS / sequence.opacity_step());
+    (log_scale, part(frame.opacity_logit()[row], offset, scale))
 }
 
-/// Values in parts of a step. In reach they are below 2^21.
+/// Values in parts of a step.
 fn parts(values: &[f32], offset: f32, step: f32) -> Vec<i32> {
-    let most = (1_u32 << 21) as f32;
     let scale = PARTS / step;
-    values.par_iter().map(|&value| nearest_integer(((value - offset) * scale).clamp(-most, most))).collect()
+    values.par_iter().map(|&value| part(value, offset, scale)).collect()
+}
+
+/// A value in parts of a step, of which there are `scale` in 1. In reach it is below 2^21.
+#[inline(always)]
+fn part(value: f32, offset: f32, scale: f32) -> i32 {
+    const MOST: f32 = 2_097_152.0;
+    nearest_integer(((value - offset) * scale).clamp(-MOST, MOST))
 }
 
 /// Whether the values of some Gaussians of a source frame are such that a decoder can have them.

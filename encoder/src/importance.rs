@@ -122,7 +122,10 @@ impl Ranking {
 
     fn ranked(&mut self, frame: &GaussianFrame) -> Ranked {
         if self.importance == Importance::Volume {
-            return Ranked { order: importance::order(&importance::opacity_volume(frame)), ..Ranked::default() };
+            return Ranked {
+                order: importance::order(&importance::opacity_volume(frame)),
+                ..Ranked::default()
+            };
         }
         self.cameras(frame);
         let by = |shown: &[Worth], score: fn(&Worth) -> f64| {
@@ -166,12 +169,14 @@ impl Ranking {
     /// A frame follows that is coded by itself. Its views are those of the sequence, so that orders do not change from I frame
     /// to I frame, unless there is something else to see, or from elsewhere: then they are made for the frame. Neither
     /// depends on other frames. Views for which an order is known already stay.
-    pub(crate) fn turn_to(&mut self, frame: &GaussianFrame) {
+    pub(crate) fn turn_to(&mut self, number: u32, frame: &GaussianFrame) {
         if self.are_given || self.known_order.is_some() {
             return;
         }
-        let own = self.made_for(frame);
-        self.cameras = if are_alike(&self.of_sequence, &own) { self.of_sequence.clone() } else { own };
+        // Those of the sequence are those of its first frame.
+        let own = (number > 0).then(|| self.made_for(frame));
+        let other = own.filter(|own| !are_alike(&self.of_sequence, own));
+        self.cameras = other.unwrap_or_else(|| self.of_sequence.clone());
     }
 
     /// The cameras in use: those of the settings, or made for the first frame of the GOP.
@@ -278,6 +283,7 @@ fn of_pixels(pixels: f64) -> f64 {
 /// The low-pass filter of a renderer widens what is smaller than a pixel, and with antialiasing fades it by as much. It is that
 /// of pictures of as many lines as quality is measured in, whatever the cameras have.
 #[expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
+#[expect(clippy::arithmetic_side_effects, reason = "places in what is in memory")]
 pub(crate) fn unhidden(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
     let lines = cameras.iter().map(|camera| camera.height as f32).sum::<f32>() / cameras.len().max(1) as f32;
     let filter = LOW_PASS * (lines / HEIGHT as f32).powi(2);
@@ -323,10 +329,13 @@ fn ranked(scores: &[f64], frame: &GaussianFrame, gaussians: &[u32]) -> Vec<u32> 
         importance::opacity_volume_of(log_scale, frame.opacity_logit()[row as usize])
     };
     let mut rows: Vec<(f64, u32)> = scores.iter().copied().zip(gaussians.iter().copied()).collect();
-    rows.par_sort_unstable_by(|a, b| {
-        let volumes = || volume(b.1).total_cmp(&volume(a.1));
-        b.0.total_cmp(&a.0).then_with(volumes).then(a.1.cmp(&b.1))
-    });
+    let falling = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
+    rows.par_sort_unstable_by(falling);
+    // Volumes take long to calculate, and most Gaussians need none.
+    for tied in rows.chunk_by_mut(|a, b| a.0.total_cmp(&b.0).is_eq()).filter(|tied| tied.len() > 1) {
+        tied.par_iter_mut().for_each(|(score, row)| *score = volume(*row));
+        tied.par_sort_unstable_by(falling);
+    }
     rows.into_iter().map(|(_, gaussian)| gaussian).collect()
 }
 
@@ -365,24 +374,25 @@ mod tests {
         let mut ranking = Ranking::new(&Settings::default());
         ranking.look_at(&scene.frame(0));
         let of_sequence = ranking.cameras.clone();
-        ranking.turn_to(&scene.frame(8));
+        ranking.turn_to(8, &scene.frame(8));
         assert_eq!(ranking.cameras, of_sequence);
         let mut far = scene.frame(8);
         far.planes_mut().position[0].iter_mut().for_each(|x| *x += 100.0);
-        ranking.turn_to(&far);
+        ranking.turn_to(8, &far);
         assert_eq!(ranking.cameras, ranking.made_for(&far));
-        ranking.turn_to(&scene.frame(4));
+        ranking.turn_to(4, &scene.frame(4));
         assert_eq!(ranking.cameras, of_sequence, "whatever was there in between");
         let mut large = scene.frame(8);
         large.planes_mut().position.into_iter().flatten().for_each(|axis| *axis *= 2.0);
-        ranking.turn_to(&large);
+        ranking.turn_to(8, &large);
         assert_ne!(ranking.cameras, of_sequence);
     }
 
     #[test]
     fn ties_go_by_volume_and_then_by_place() {
-        let mut frame = BuiltinScene { gaussians: 4, ..BuiltinScene::default() }.frame(0);
-        let PlanesMut { log_scale, opacity_logit, .. } = frame.planes_mut();
+        let scene = BuiltinScene { gaussians: 100, ..BuiltinScene::default() };
+        let mut frame = scene.frame(0).select(&[0, 1, 2, 3]);
+        let splatstream_gaussians::PlanesMut { log_scale, opacity_logit, .. } = frame.planes_mut();
         opacity_logit.fill(0.0);
         log_scale.into_iter().for_each(|plane| plane.copy_from_slice(&[0.0, -3.0, 1.0, 0.0]));
         assert_eq!(ranked(&[0.0, 2.0, 0.0, 0.0], &frame, &[0, 1, 2, 3]), [1, 2, 0, 3]);

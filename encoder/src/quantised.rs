@@ -98,7 +98,11 @@ impl<'a> Trial<'a> {
             position: if has(Attribute::Position) { self.positions() } else { source.position.clone() },
             log_scale: if has(Attribute::LogScale) { self.log_scales() } else { source.log_scale.clone() },
             rotation: if has(Attribute::Rotation) { self.rotations() } else { source.rotation.clone() },
-            opacity_logit: if has(Attribute::Opacity) { self.opacities() } else { source.opacity_logit.clone() },
+            opacity_logit: if has(Attribute::Opacity) {
+                self.opacities()
+            } else {
+                source.opacity_logit.clone()
+            },
             dc: if has(Attribute::Dc) { dc() } else { source.dc.clone() },
             sh: if has(Attribute::Sh) { self.colours(1) } else { source.sh.to_vec() },
         };
@@ -178,7 +182,10 @@ impl<'a> Trial<'a> {
     }
 
     /// Planes of dc, 0, or sh, 1, from their coded values: forth, to the nearest steps, and back, as long as values are near.
-    #[expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; another place of an array")]
+    #[expect(
+        clippy::arithmetic_side_effects,
+        reason = "sums and products of floats; another place of an array"
+    )]
     fn colours(&self, which: usize) -> Vec<Vec<f32>> {
         let (basis, finest) = (&self.bases[which], self.colour_step(which));
         let (forwards, planes) = self.forwards(which);

@@ -268,8 +268,9 @@ impl Scene {
             self.sample = Reach::sample(frame, shown);
             self.means = means(frame, shown);
         }
-        self.extent = self.extent.with(frame, shown);
-        self.cores.push(Core::of(frame, shown));
+        let (extent, core) = rayon::join(|| self.extent.with(frame, shown), || Core::of(frame, shown));
+        self.extent = extent;
+        self.cores.push(core);
         let rows = || shown.par_iter().with_min_len(AT_ONCE);
         let farthest = |planes: &[&[f32]], from: f32| {
             let of_row = |&row: &u32| {
@@ -350,10 +351,14 @@ impl Scene {
 /// Means of the largest log-scale and of the opacity, so that what is coded is near 0.
 #[expect(clippy::indexing_slicing, reason = "axes are constants, and rows are those of the frame")]
 fn means(frame: &GaussianFrame, shown: &[u32]) -> [f32; 2] {
-    let mean = |value: &dyn Fn(usize) -> f32| {
+    let mean = |value: &(dyn Fn(usize) -> f32 + Sync)| {
         let sum: f64 = shown.iter().map(|&row| f64::from(value(row as usize))).sum();
         (sum / shown.len().max(1) as f64) as f32
     };
     let [a, b, c] = frame.log_scale();
-    [mean(&|row| a[row].max(b[row]).max(c[row])), mean(&|row| frame.opacity_logit()[row])]
+    let (size, opacity) = rayon::join(
+        || mean(&|row| a[row].max(b[row]).max(c[row])),
+        || mean(&|row| frame.opacity_logit()[row]),
+    );
+    [size, opacity]
 }

@@ -1,6 +1,6 @@
 //! Gaussians as C sees them.
 
-use splatstream::Planes;
+use splatstream::PlanesRef;
 
 /// Gaussians as planes: value i of each plane belongs to Gaussian i, or to slot i.
 #[repr(C)]
@@ -27,7 +27,7 @@ pub struct SplatstreamPlanes {
 
 impl SplatstreamPlanes {
     /// Points to planes. `sh` keeps the pointers to those of the spherical harmonics.
-    pub(crate) fn of(planes: &Planes, sh: &mut Vec<*const f32>) -> Self {
+    pub(crate) fn of(planes: PlanesRef<'_>, sh: &mut Vec<*const f32>) -> Self {
         sh.clear();
         sh.extend(planes.sh.iter().map(|plane| plane.as_ptr()));
         Self {

@@ -123,7 +123,7 @@ pub unsafe extern "C" fn splatstream_slots_planes(
     // SAFETY: the contract of the header.
     unsafe {
         call::run(slots, |slots| {
-            call::set(planes, SplatstreamPlanes::of(slots.slots.planes(), &mut slots.sh))?;
+            call::set(planes, SplatstreamPlanes::of(slots.slots.planes().into(), &mut slots.sh))?;
             Ok(SplatstreamStatus::Ok)
         })
     }

@@ -8,7 +8,7 @@ use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use splatstream::Planes;
+use splatstream::PlanesRef;
 
 /// The values of planes of one length, those of a row side by side.
 pub(crate) fn interleaved<'a>(planes: impl ExactSizeIterator<Item = &'a [f32]>, rows: usize) -> Vec<f32> {
@@ -136,14 +136,14 @@ fn column(values: &[f32], component: usize, width: usize) -> Vec<f32> {
 }
 
 /// The planes of an attribute by its name, for arrays.
-pub(crate) fn attribute<'a>(planes: &'a Planes, name: &str) -> Vec<&'a [f32]> {
+pub(crate) fn attribute<'a>(planes: PlanesRef<'a>, name: &str) -> Vec<&'a [f32]> {
     let slices = |planes: &'a [Vec<f32>]| planes.iter().map(Vec::as_slice).collect();
     match name {
-        "position" => slices(&planes.position),
-        "log_scale" => slices(&planes.log_scale),
-        "rotation" => slices(&planes.rotation),
+        "position" => slices(planes.position),
+        "log_scale" => slices(planes.log_scale),
+        "rotation" => slices(planes.rotation),
         "opacity_logit" => vec![planes.opacity_logit.as_slice()],
-        "dc" => slices(&planes.dc),
-        _ => slices(&planes.sh),
+        "dc" => slices(planes.dc),
+        _ => slices(planes.sh),
     }
 }

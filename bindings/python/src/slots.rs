@@ -54,7 +54,7 @@ pub(crate) struct Update {
 /// An array of one attribute of all rows, as they are in the planes.
 fn array(py: Python<'_>, planes: &Planes, name: &str) -> PyResult<Py<PyArrayDyn<f32>>> {
     let rows = planes.opacity_logit.len();
-    let planes = attribute(planes, name);
+    let planes = attribute(planes.into(), name);
     let shape = match name {
         "opacity_logit" => vec![rows],
         "sh" => vec![rows, planes.len() / 3, 3],
@@ -113,7 +113,7 @@ impl Slots {
             if update.has_new_planes && name == "sh" {
                 *to = array(py, slots.planes(), name)?;
             } else {
-                copy(to.bind(py), &attribute(slots.planes(), name), &update.dirty)?;
+                copy(to.bind(py), &attribute(slots.planes().into(), name), &update.dirty)?;
             }
         }
         let slice =

@@ -78,11 +78,9 @@ impl Decoded {
             }
             let gaussians = to_gaussians(shown, &sequence).map_err(io::Error::other)?;
             let planes = gaussians.planes();
-            let opacity = std::slice::from_ref(&planes.opacity_logit);
-            let planes =
-                [&planes.position[..], &planes.log_scale, opacity, &planes.rotation, &planes.dc, &planes.sh]
-                    .concat();
-            let bytes: Vec<u8> = planes.concat().into_iter().flat_map(f32::to_le_bytes).collect();
+            let shapes = planes.position.iter().chain(planes.log_scale).chain([planes.opacity_logit]);
+            let planes = shapes.chain(planes.rotation).chain(planes.dc).chain(planes.sh);
+            let bytes: Vec<u8> = planes.flatten().flat_map(|value| value.to_le_bytes()).collect();
             fs::write(folder.join(floats_name(index)), bytes)?;
         }
         Ok(())

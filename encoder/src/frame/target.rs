@@ -8,7 +8,7 @@ use splatstream_gaussians::GaussianFrame;
 pub(crate) struct Target {
     /// Canonical, without what is never seen.
     pub(crate) frame: GaussianFrame,
-    /// Positions in grid steps.
+    /// Positions in grid steps; empty where frames refer to no others.
     pub(crate) position: [Vec<f32>; 3],
     /// Row of each Gaussian in its file, and rows of the file.
     pub(crate) rows: Vec<u32>,

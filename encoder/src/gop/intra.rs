@@ -20,7 +20,7 @@ impl SpanCoder<'_> {
     /// An I frame to be coded, and the order of its Gaussians.
     pub(super) fn intra_target(&mut self, number: u32) -> Result<Intra, Error> {
         let target = self.target(number)?;
-        self.ranking.turn_to(&target.frame);
+        self.ranking.turn_to(number, &target.frame);
         let order = self.ranking.order(&target.frame);
         Ok(Intra { target, order })
     }

@@ -1,9 +1,10 @@
 //! Clause 8.4 from the other side: coding the symbols of a block.
 
+use super::frequencies::Frequencies;
 use super::lanes::Segments;
 use super::model::PlaneModel;
 use super::token::split;
-use super::{FREQUENCY_BITS, FREQUENCY_SUM, MAX_LANES, STATE_LOW};
+use super::{FREQUENCY_BITS, MAX_LANES, STATE_LOW};
 use crate::bits::BitWriter;
 use crate::payload::write_leb128;
 use crate::{Error, ErrorKind, Result};
@@ -42,7 +43,8 @@ impl PlaneEncoder {
             }
             symbols
         };
-        let of_tables = model.tables.iter().map(|table| table.of_token()).chain([&[] as &[u16]]);
+        let nothing: &[u16] = &[];
+        let of_tables = model.tables.iter().map(Frequencies::of_token).chain([nothing]);
         let mut table_of_context = [u8::try_from(model.tables.len()).unwrap_or(u8::MAX); CONTEXTS];
         table_of_context.iter_mut().zip(&model.table_of_context).for_each(|(to, &table)| *to = table);
         Self { direct_log2: model.direct_log2, symbols: of_tables.map(expanded).collect(), table_of_context }
@@ -71,7 +73,12 @@ pub struct BlockWriter {
 impl BlockWriter {
     /// An empty block with 2^`lanes_log2` states, at most 32.
     pub fn new(lanes_log2: u8) -> Self {
-        Self { lanes_log2: lanes_log2.min(5), symbols: Vec::new(), lengths: Vec::new(), raw: BitWriter::new() }
+        Self {
+            lanes_log2: lanes_log2.min(5),
+            symbols: Vec::new(),
+            lengths: Vec::new(),
+            raw: BitWriter::new(),
+        }
     }
 
     /// Adds a plane: unsigned values and their contexts (empty: all 0).
@@ -147,15 +154,20 @@ impl BlockWriter {
     }
 }
 
-/// 2^44 divided by each frequency, rounded up; frequency 0 codes nothing.
-static RECIPROCALS: [u64; FREQUENCY_SUM as usize + 1] = reciprocals();
+/// Frequencies that there are, 0 among them.
+const FREQUENCIES: usize = 1_usize.wrapping_shl(FREQUENCY_BITS).wrapping_add(1);
 
-const fn reciprocals() -> [u64; FREQUENCY_SUM as usize + 1] {
-    let mut reciprocals = [0; FREQUENCY_SUM as usize + 1];
-    let mut frequency = 1_usize;
-    while frequency < reciprocals.len() {
-        reciprocals[frequency] = (1_u64 << 44).div_ceil(frequency as u64);
-        frequency += 1;
+/// 2^44 divided by each frequency, rounded up; 0 for frequency 0, which codes nothing.
+static RECIPROCALS: [u64; FREQUENCIES] = reciprocals();
+
+const fn reciprocals() -> [u64; FREQUENCIES] {
+    let mut reciprocals = [0_u64; FREQUENCIES];
+    let mut rest = reciprocals.as_mut_slice();
+    let mut frequency = 0_u64;
+    while let Some((reciprocal, others)) = rest.split_first_mut() {
+        *reciprocal = if frequency == 0 { 0 } else { 1_u64.wrapping_shl(44).div_ceil(frequency) };
+        frequency = frequency.wrapping_add(1);
+        rest = others;
     }
     reciprocals
 }
@@ -168,7 +180,8 @@ const fn reciprocals() -> [u64; FREQUENCY_SUM as usize + 1] {
 #[inline(always)]
 fn quotient(state: u32, frequency: u32) -> u32 {
     let reciprocal = usize::try_from(frequency).ok().and_then(|at| RECIPROCALS.get(at)).copied().unwrap_or(0);
-    (u64::from(state).wrapping_mul(reciprocal) >> 44) as u32
+    let [a, b, c, d, ..] = (u64::from(state).wrapping_mul(reciprocal) >> 44).to_le_bytes();
+    u32::from_le_bytes([a, b, c, d])
 }
 
 /// The states of a block, and the words that left them.
@@ -208,6 +221,25 @@ impl States {
                     .wrapping_shl(FREQUENCY_BITS)
                     .wrapping_add(remainder)
                     .wrapping_add(u32::from(first));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quotients_are_exact_where_they_change_and_at_the_ends() {
+        for frequency in 1..=1_u32 << FREQUENCY_BITS {
+            // A state is below 2^20 times the frequency when a symbol is coded.
+            let most = (u64::from(frequency) << 20) - 1;
+            let most = u32::try_from(most.min(u64::from(u32::MAX))).unwrap();
+            let multiples = (0..32).map(|shift| (most >> shift) / frequency * frequency);
+            let around = multiples.flat_map(|state| [state.saturating_sub(1), state, (state + 1).min(most)]);
+            for state in around.chain([0, 1, most - 1, most]) {
+                assert_eq!(quotient(state, frequency), state / frequency, "{state} / {frequency}");
             }
         }
     }

@@ -77,8 +77,9 @@ impl<'a> PlanesRef<'a> {
 
     /// Every plane with its PLY name, in PLY's usual order apart from `f_rest_*`, which come in plane order.
     pub(crate) fn named(self, sh_degree: u8) -> impl Iterator<Item = (String, &'a Vec<f32>)> {
-        let numbered =
-            |prefix: &'static str| move |(at, plane)| (format!("{prefix}{at}"), plane) as (String, &'a Vec<f32>);
+        let numbered = |prefix: &'static str| {
+            move |(at, plane)| (format!("{prefix}{at}"), plane) as (String, &'a Vec<f32>)
+        };
         let rest = move |(plane, values)| (format!("f_rest_{}", rest_index(plane, sh_degree)), values);
         ["x", "y", "z"]
             .into_iter()
@@ -203,11 +204,12 @@ impl Planes {
         let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
         position.iter_mut().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
     }
+}
 
-    /// The same to be read.
-    pub(crate) fn to_read(&self) -> PlanesRef<'_> {
-        let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
-        PlanesRef { position, log_scale, rotation, opacity_logit, dc, sh }
+impl<'a> From<&'a Planes> for PlanesRef<'a> {
+    fn from(planes: &'a Planes) -> Self {
+        let Planes { position, log_scale, rotation, opacity_logit, dc, sh } = planes;
+        Self { position, log_scale, rotation, opacity_logit, dc, sh }
     }
 }
 
@@ -234,7 +236,9 @@ impl GaussianFrame {
             return Err(FrameError::ShPlanes { degree: sh_degree, expected, found });
         }
         let rows = planes.position[0].len();
-        if let Some((property, plane)) = planes.to_read().named(sh_degree).find(|(_, plane)| plane.len() != rows) {
+        if let Some((property, plane)) =
+            PlanesRef::from(&planes).named(sh_degree).find(|(_, plane)| plane.len() != rows)
+        {
             return Err(FrameError::Length { property, expected: rows, found: plane.len() });
         }
         Ok(Self::made_of(planes, sh_degree, false))
