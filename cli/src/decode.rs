@@ -6,7 +6,7 @@ mod loss;
 mod report;
 mod target;
 
-pub(crate) use target::earlier_frames;
+pub(crate) use target::frame_directory;
 
 use crate::console::Console;
 use crate::failure::Failure;
@@ -57,7 +57,8 @@ pub(crate) struct Decode {
     /// Format of the files; default is that of the file's name, or ply.
     #[arg(long, value_enum)]
     format: Option<Format>,
-    /// Remove frames of an earlier run from the directory: files that have the names that this command gives.
+    /// Replace the frames of an earlier run in the directory: files that have the names that this command gives. They go when
+    /// all new ones are whole, and stay where the command fails or the stream has an error: the disk has to hold both.
     #[arg(long)]
     force: bool,
     /// Show only the Gaussians of the operating point's units, not those that are carried from the I frame.
@@ -115,7 +116,11 @@ impl Decode {
         }
         let verdict = summary.verdict();
         let loss = Loss::new(&stream, announced, &options, &summary, frames, &decoding.shown.indices());
-        let report = Report { seek, ..self.report(decoding, loss, announced, total) };
+        let mut report = Report { seek, ..self.report(decoding, loss, announced, total) };
+        match target {
+            Some(target) if verdict.is_some() && target.replaces() => report.keep_earlier(),
+            target => target.map_or(Ok(()), Target::finish)?,
+        }
         report.warnings.iter().for_each(|warning| console.complain(&warning.text()));
         // Of a file that is no stream there is nothing to say but the error.
         console.report_beside(self.out.as_deref(), &report, || {
@@ -158,6 +163,7 @@ impl Decode {
         let is_known = frames > 0 && announced > 0 && !self.strict;
         Report {
             output: self.out.clone(),
+            keeps_earlier: false,
             frames,
             frames_in_stream: (announced > 0).then_some(announced),
             gaussians: decoding.gaussians,

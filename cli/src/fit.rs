@@ -7,14 +7,14 @@ mod training;
 use crate::cameras::BackgroundArg;
 use crate::capture_files::files_of;
 use crate::console::Console;
-use crate::decode::earlier_frames;
-use crate::earlier::Earlier;
+use crate::decode::frame_directory;
 use crate::failure::Failure;
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
 use crate::memory_bound::{MemoryBound, bytes_of_gaussians};
 use crate::numbers::{FrameRange, counted, parse_share};
-use crate::output_file::{OutputFile, check_directory, make_directory, refuse_inputs, refuse_standard};
+use crate::output_directory::OutputDirectory;
+use crate::output_file::{OutputFile, check_directory, refuse_inputs, refuse_standard};
 use crate::stream_file::LimitArgs;
 use captures::Captures;
 use clap::Args;
@@ -100,7 +100,9 @@ pub(crate) struct Fit {
     /// Keep frames of a sequence that are there already, as an earlier run with the same settings left them.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
-    /// Remove frames of an earlier run from the directory of a sequence: files that have the names that frames are given.
+    /// Replace the frames of an earlier run in the directory of a sequence: files that have the names that frames are given. They
+    /// go when all new ones are whole, and stay where the command fails or is interrupted, which then leaves none of its own: the
+    /// disk has to hold both.
     #[arg(long)]
     force: bool,
     /// Chooses the order of pictures and where new Gaussians go.
@@ -135,7 +137,7 @@ impl Fit {
         let options = self.limits.options_to_draw();
         let mut starts = opened.as_ref().map(|opened| opened.frames(&options, None)).transpose()?;
         let inputs = starts.as_ref().map(Frames::inputs).unwrap_or_default();
-        let mut earlier = self.earlier(&captures, &inputs)?;
+        let mut directory = self.directory(&captures, &inputs)?;
         let span = self.frames.unwrap_or(FrameRange::ALL);
         let mut report = Fitted::new(self.out.clone(), captures.is_sequence());
         let mut before: Option<GaussianFrame> = None;
@@ -150,13 +152,17 @@ impl Fit {
                 Some(path) => self.kept(path)?,
                 None => self.fit(&captures, number, (out.as_deref(), &inputs), start, before.take())?,
             };
-            if let (Some(out), None) = (&out, kept) {
-                earlier.remove()?;
-                OutputFile::write_apart(out, &inputs, &ply::write(&frame))?;
+            match (&mut directory, &out) {
+                _ if kept.is_some() => {}
+                (Some(directory), _) => directory.write(Captures::file(number), &ply::write(&frame))?,
+                (None, Some(out)) => OutputFile::write_apart(out, &inputs, &ply::write(&frame))?,
+                (None, None) => {}
             }
             // The next one starts from what is in the file, as it does when it is resumed.
-            before = match &out {
-                Some(out) if self.warm => Some(self.kept(out)?.0),
+            before = match &directory {
+                Some(directory) if self.warm => {
+                    Some(self.kept(&directory.place_of(Captures::file(number)))?.0)
+                }
                 _ => None,
             };
             report.add(number, out, fitted);
@@ -164,6 +170,7 @@ impl Fit {
         if report.is_empty() {
             return Err(Failure::Usage(format!("{}: it has no such frame", self.input.display())));
         }
+        directory.map_or(Ok(()), OutputDirectory::finish)?;
         report.finish(begin.elapsed());
         console.report(&report, || report.text())
     }
@@ -177,10 +184,7 @@ impl Fit {
                     .to_owned(),
             )),
             None => Ok(()),
-            Some(out) if captures.is_sequence() => {
-                check_directory(out, "frames of a sequence")?;
-                make_directory(out)
-            }
+            Some(out) if captures.is_sequence() => check_directory(out, "frames of a sequence"),
             Some(out) => {
                 refuse_standard(out)?;
                 let is_ply = out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("ply"));
@@ -196,12 +200,14 @@ impl Fit {
         }
     }
 
-    /// Frames of an earlier run in the directory of a sequence.
-    fn earlier(&self, captures: &Captures, inputs: &[PathBuf]) -> Result<Earlier, Failure> {
-        match &self.out {
-            Some(out) if captures.is_sequence() && !self.resume => earlier_frames(out, inputs, self.force),
-            _ => Ok(Earlier::default()),
-        }
+    /// The directory of a sequence.
+    fn directory(&self, captures: &Captures, inputs: &[PathBuf]) -> Result<Option<OutputDirectory>, Failure> {
+        let out = self.out.as_deref().filter(|_| captures.is_sequence());
+        let open = |out| match self.resume {
+            true => OutputDirectory::resumed(out, inputs),
+            false => frame_directory(out, inputs, self.force),
+        };
+        out.map(open).transpose()
     }
 
     /// The frame of a start that belongs to a capture.

@@ -1,6 +1,6 @@
 //! What frames are called in directories, where many commands write them and look for them.
 
-use crate::earlier::is_numbered;
+use crate::output_directory::is_numbered;
 
 /// The name of a frame, without an ending: frame_0000.
 pub(crate) fn frame_name(number: u32) -> String {

@@ -13,7 +13,6 @@ mod conformance;
 mod console;
 mod decode;
 mod demo;
-mod earlier;
 mod encode;
 mod extract;
 mod failure;
@@ -28,6 +27,7 @@ mod machine;
 mod manual;
 mod memory_bound;
 mod numbers;
+mod output_directory;
 mod output_file;
 mod over_limit;
 mod package;
@@ -73,7 +73,7 @@ pub use encode::{EncodeOptions, OptionsError, Prepared};
         12 unsupported, 13 over a limit, 14 truncated; 130 interrupted.\n\n\
         Outputs: a file of the name given with -o is replaced, in one step when the new one is whole; a command that\n\
         fails leaves it as it was. Refused are files that the command reads, disks, and directories with files of an\n\
-        earlier run, which --force removes.\n\n\
+        earlier run. Those --force replaces, all together when the new ones are whole: until then the disk holds both.\n\n\
         The keys that --json prints are described in cli/json.md."
 )]
 struct Cli {
@@ -127,11 +127,12 @@ pub fn main(arguments: &[OsString]) -> u8 {
     let console = Console::new(cli.json, cli.quiet);
     progress::set_quiet(cli.quiet);
     let ended = in_threads(cli.threads, || cli.command.run(&console));
-    unfinished::end(ended.is_ok());
+    let kept = unfinished::end(ended.is_ok());
     match ended {
         Ok(()) => 0,
         Err(failure) => {
             console.fail(&failure);
+            kept.iter().for_each(|text| console.complain(&format!("  {text}")));
             if matches!(failure, Failure::Usage(_)) {
                 console.complain(&format!("  {command} --help shows an example"));
             }

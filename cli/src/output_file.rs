@@ -43,6 +43,23 @@ impl OutputFile {
         Ok(Self { writer, unfinished, path: path.to_path_buf() })
     }
 
+    /// A file that will be at `place` for now, and at `path` when all files are there that belong together. `inputs` are not
+    /// replaced by it then.
+    pub(crate) fn stage(path: &Path, place: &Path, inputs: &[PathBuf]) -> Result<Self, Failure> {
+        refuse_inputs(path, inputs)?;
+        if path.is_dir() {
+            return Err(is_directory(path));
+        }
+        let (file, unfinished) = beside(path, place, None)?;
+        let writer: BufWriter<Box<dyn Write>> = BufWriter::with_capacity(1 << 20, Box::new(file));
+        Ok(Self { writer, unfinished: Some((unfinished, place.to_path_buf())), path: path.to_path_buf() })
+    }
+
+    /// Where it will be.
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// Gives the file its name, in place of one that may be there.
     pub(crate) fn finish(mut self) -> Result<(), Failure> {
         let failed = |error: io::Error| Failure::file("write", &self.path, &error);

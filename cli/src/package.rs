@@ -4,10 +4,10 @@ mod live;
 mod quality;
 
 use crate::console::Console;
-use crate::earlier;
 use crate::failure::Failure;
 use crate::numbers::counted;
-use crate::output_file::{OutputFile, check_directory, make_directory, refuse_inputs};
+use crate::output_directory::{self, OutputDirectory};
+use crate::output_file::{OutputFile, check_directory};
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -53,7 +53,8 @@ pub(crate) struct PackageStream {
     /// pictures of its I frame and of a frame of each temporal layer go to the manifest.
     #[arg(long, conflicts_with = "live")]
     quality: bool,
-    /// Replace a package that is in the directory.
+    /// Replace a package that is in the directory. It goes when the new one is whole, and stays where the command fails: the
+    /// disk has to hold both. With --live it goes when the first GOP comes.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -98,25 +99,21 @@ impl PackageStream {
     /// Packages the stream.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "packages")?;
-        let stale = self.stale()?;
+        let inputs = slice::from_ref(&self.input);
+        let mut directory = OutputDirectory::new(&self.out, files_in, "packages", inputs, self.force)?;
         let layout = match self.layout {
             LayoutName::Gop => Layout::Gop,
             LayoutName::Frame => Layout::Frame,
         };
         let options = Options { layout, ..Options::default() };
         if self.live {
-            make_directory(&self.out)?;
-            clear(&stale)?;
             let settings = self.live_settings(options);
-            return live::run((&self.input, &self.out), &settings, &self.limits.limits(), console);
+            return live::run(&self.input, directory, &settings, &self.limits.limits(), console);
         }
         let stream = StreamFile::read(&self.input)?;
         let package = package(&stream, &options, &self.limits.options_to_draw(), self.quality)?;
-        make_directory(&self.out)?;
-        let (files, sizes) = written(&package, &self.out, slice::from_ref(&self.input))?;
-        // Nothing of the earlier package is lost before all of this one is on the disk.
-        clear(&stale)?;
-        files.into_iter().try_for_each(OutputFile::finish)?;
+        let sizes = write(&package, &mut |name| directory.create(name))?;
+        directory.finish()?;
         let report = Report::new(&self.out, &package.manifest, (stream.bytes.len() as u64, sizes));
         console.report(&report, || report.text())
     }
@@ -127,31 +124,11 @@ impl PackageStream {
         let window_ms = self.window.map_or(default.window_ms, milliseconds);
         Settings { window_ms, target_latency_ms: self.target_latency.map(milliseconds), ..default }
     }
-
-    /// The files of an earlier package, if they may be replaced.
-    fn stale(&self) -> Result<Vec<PathBuf>, Failure> {
-        let stale = files_in(&self.out);
-        if !stale.is_empty() && !self.force {
-            return Err(Failure::Usage(format!(
-                "{}: there is a package in the directory; give another one, or --force to replace it",
-                self.out.display()
-            )));
-        }
-        stale.iter().try_for_each(|path| refuse_inputs(path, slice::from_ref(&self.input)))?;
-        Ok(stale)
-    }
-}
-
-/// Removes the files of an earlier package.
-fn clear(stale: &[PathBuf]) -> Result<(), Failure> {
-    stale.iter().try_for_each(|path| {
-        std::fs::remove_file(path).map_err(|error| Failure::file("remove", path, &error))
-    })
 }
 
 /// The files of a package in a directory, by name; none where there is no package.
 pub(crate) fn files_in(directory: &Path) -> Vec<PathBuf> {
-    earlier::files_in(directory, is_of_package)
+    output_directory::files_in(directory, is_of_package)
 }
 
 /// A package of a stream, with the table of qualities if it is wanted.
@@ -169,21 +146,17 @@ pub(crate) fn package<'a>(
     Ok(package)
 }
 
-/// Writes all files to a directory, those that name others last; how many bytes they have. No input is overwritten.
-pub(crate) fn write(package: &Package<'_>, out: &Path, inputs: &[PathBuf]) -> Result<u64, Failure> {
-    let (files, bytes) = written(package, out, inputs)?;
-    files.into_iter().try_for_each(OutputFile::finish)?;
-    Ok(bytes)
-}
-
-/// The same, but the files do not have their names yet: there is a whole package or none.
-fn written(package: &Package<'_>, out: &Path, inputs: &[PathBuf]) -> Result<(Vec<OutputFile>, u64), Failure> {
+/// Writes all files of a package to those that are created by name, those that name others last; how many bytes they have.
+/// None has its name before all are written: there is a whole package or none.
+pub(crate) fn write(
+    package: &Package<'_>,
+    create: &mut dyn FnMut(&str) -> Result<OutputFile, Failure>,
+) -> Result<u64, Failure> {
     let (mut files, mut bytes) = (Vec::new(), 0);
     let mut take = |name: &str, size: u64, write: &mut dyn FnMut(&mut OutputFile) -> io::Result<()>| {
-        let path = out.join(name);
-        let mut file = OutputFile::create(&path, inputs)?;
+        let mut file = create(name)?;
         let whole = write(&mut file).and_then(|()| file.flush());
-        whole.map_err(|error| Failure::file("write", &path, &error))?;
+        whole.map_err(|error| Failure::file("write", file.path(), &error))?;
         bytes += size;
         files.push(file);
         Ok::<(), Failure>(())
@@ -195,7 +168,8 @@ fn written(package: &Package<'_>, out: &Path, inputs: &[PathBuf]) -> Result<(Vec
     for (name, text) in [(Package::MANIFEST, &manifest), (Package::MPD, &package.mpd)] {
         take(name, text.len() as u64, &mut |file| file.write_all(text.as_bytes()))?;
     }
-    Ok((files, bytes))
+    files.into_iter().try_for_each(OutputFile::finish)?;
+    Ok(bytes)
 }
 
 /// From nothing to a day.

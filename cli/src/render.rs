@@ -2,13 +2,13 @@
 
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::console::Console;
-use crate::earlier::{Earlier, files_in, is_numbered};
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frame_name::{frame_name, is_frame_name};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
 use crate::numbers::{FrameRange, counted, frames};
-use crate::output_file::{OutputFile, check_directory, make_directory};
+use crate::output_directory::{OutputDirectory, files_in, is_numbered};
+use crate::output_file::check_directory;
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use crate::up_guess::UpGuess;
@@ -50,8 +50,9 @@ pub(crate) struct Render {
     /// Frames to draw, A..B: from A up to and without B.
     #[arg(long, value_name = "A..B", value_parser = FrameRange::parse)]
     frames: Option<FrameRange>,
-    /// Remove the pictures that an earlier run has left in the directory: .png files with the names that pictures are given
-    /// (frame_0000_..., ring_00, forward_00, camera_00), or those of the cameras. Other pictures stay.
+    /// Replace the pictures that an earlier run has left in the directory: .png files with the names that pictures are given
+    /// (frame_0000_..., ring_00, forward_00, camera_00), or those of the cameras. They go when all new ones are whole, and stay
+    /// where the command fails or the stream has an error: the disk has to hold both. Other pictures stay.
     #[arg(long)]
     force: bool,
     /// Make up for the low-pass filter, whatever the scene says: for scenes that were trained so.
@@ -67,10 +68,7 @@ pub(crate) struct Render {
 struct Drawing {
     cameras: Vec<Camera>,
     background: [f32; 3],
-    /// What no picture may replace.
-    inputs: Vec<PathBuf>,
-    /// Pictures of an earlier run; known when the cameras are.
-    earlier: Earlier,
+    directory: OutputDirectory,
 }
 
 /// What `--json` prints.
@@ -120,19 +118,22 @@ impl Render {
         let expected = frames.expected();
         let progress = Progress::frames("drawing", span.count_in(expected));
         let mut drawn = self.nothing();
-        let mut drawing = self.drawing(&frames, &description);
+        let inputs = self.inputs(&frames);
+        let mut drawing = None;
         let mut next = 0;
         while !span.is_over(next) {
             let Some((number, frame)) = frames.next()? else { break };
-            if drawing.cameras.is_empty() {
-                drawing.cameras = named(self.cameras.cameras(self.camera.as_ref(), &frame, &description)?);
-                drawing.earlier = self.earlier(&drawing)?;
-                drawn.guessed_up = self.guessed_up(&frame, &description);
-            }
+            let drawing = match &mut drawing {
+                Some(drawing) => drawing,
+                None => {
+                    drawn.guessed_up = self.guessed_up(&frame, &description);
+                    drawing.insert(self.drawing(&frame, &description, &inputs)?)
+                }
+            };
             if span.contains(number) {
                 let antialiased = frame.antialiased() || self.antialiased;
                 let frame = frame.with_antialiased(antialiased);
-                self.draw(&frame, (number, expected > 1), &mut drawing, &mut drawn)?;
+                self.draw(&frame, (number, expected > 1), drawing, &mut drawn)?;
                 progress.at(drawn.frames);
             }
             next = number.saturating_add(1);
@@ -144,26 +145,30 @@ impl Render {
         }
         drawn.expected = expected;
         drawn.seconds = drawn.pictures.iter().map(|picture| picture.seconds).sum();
+        if let Some(Drawing { directory, .. }) = drawing {
+            // Pictures of a stream with errors replace none.
+            if directory.replaces() {
+                frames.verdict()?;
+            }
+            directory.finish()?;
+        }
         drawn.errors = frames.faults();
         frames.warnings().iter().for_each(|warning| console.complain(&warning.text()));
         console.report(&drawn, || drawn.text())?;
         frames.verdict()
     }
 
-    /// What all pictures have in common, before there are cameras.
-    fn drawing(&self, frames: &Frames<'_>, description: &SceneDescription) -> Drawing {
-        Drawing {
-            cameras: Vec::new(),
-            background: self.background.colour(description),
-            inputs: self.inputs(frames),
-            earlier: Earlier::default(),
-        }
-    }
-
-    /// Pictures of an earlier run in the directory.
-    fn earlier(&self, drawing: &Drawing) -> Result<Earlier, Failure> {
-        let pictures = files_in(&self.out, |path| is_picture(path, &drawing.cameras));
-        Earlier::of(&self.out, pictures, "pictures", &drawing.inputs, self.force)
+    /// What all pictures have in common; cameras may be made for the first frame. None of `inputs` is replaced.
+    fn drawing(
+        &self,
+        first: &GaussianFrame,
+        description: &SceneDescription,
+        inputs: &[PathBuf],
+    ) -> Result<Drawing, Failure> {
+        let cameras = named(self.cameras.cameras(self.camera.as_ref(), first, description)?);
+        let pictures = |out: &Path| files_in(out, |path| is_picture(path, &cameras));
+        let directory = OutputDirectory::new(&self.out, pictures, "pictures", inputs, self.force)?;
+        Ok(Drawing { cameras, background: self.background.colour(description), directory })
     }
 
     /// The report before anything is drawn.
@@ -207,8 +212,6 @@ impl Render {
         drawing: &mut Drawing,
         drawn: &mut Drawn,
     ) -> Result<(), Failure> {
-        make_directory(&self.out)?;
-        drawing.earlier.remove()?;
         for camera in &drawing.cameras {
             let start = Instant::now();
             let rendering = render(frame, camera, drawing.background);
@@ -216,10 +219,10 @@ impl Render {
             let view = &camera.name;
             let file =
                 if sequence { format!("{}_{view}.png", frame_name(number)) } else { format!("{view}.png") };
-            let path = self.out.join(&file);
+            let path = drawing.directory.path_of(&file);
             let failed = |error| Failure::other(format!("{}: cannot write: {error}", path.display()));
             let png = rendering.colour.to_png().map_err(failed)?;
-            OutputFile::write_apart(&path, &drawing.inputs, &png)?;
+            drawing.directory.write(&file, &png)?;
             let (width, height) = (camera.width, camera.height);
             drawn.pictures.push(Picture { file, frame: number, view: view.clone(), width, height, seconds });
         }

@@ -1,11 +1,11 @@
 //! `splatstream simulate`: captures of a scene that is known exactly.
 
 use crate::console::Console;
-use crate::earlier::{Earlier, files_in, is_numbered};
 use crate::failure::Failure;
 use crate::frame_name::{frame_name, is_frame_name};
 use crate::numbers::{counted, frames};
-use crate::output_file::{OutputFile, check_directory, make_directory};
+use crate::output_directory::{OutputDirectory, files_in, is_numbered};
+use crate::output_file::check_directory;
 use crate::progress::Progress;
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -49,7 +49,8 @@ pub(crate) struct Simulate {
     /// Points, as structure from motion would find them.
     #[arg(long, value_name = "N", default_value_t = 10_000, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     points: u32,
-    /// Remove captures of an earlier run from the directory: files that have the names that this command gives.
+    /// Replace captures of an earlier run in the directory: files that have the names that this command gives. They go when all
+    /// new ones are whole, and stay where the command fails or is interrupted: the disk has to hold both.
     #[arg(long)]
     force: bool,
     /// Chooses colours and where movements start.
@@ -83,7 +84,7 @@ impl Simulate {
     /// Traces and writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "pictures")?;
-        Earlier::of(&self.out, earlier_files(&self.out), "captures", &[], self.force)?.remove()?;
+        let mut directory = OutputDirectory::new(&self.out, earlier_files, "captures", &[], self.force)?;
         let start = Instant::now();
         let width = (self.height * 16).div_ceil(9);
         let rig = match self.rig {
@@ -94,9 +95,10 @@ impl Simulate {
         let progress = Progress::frames("tracing", self.frames.saturating_mul(self.views));
         for frame in 0..self.frames {
             let done = |view: u32| progress.at(frame.saturating_mul(self.views).saturating_add(view));
-            self.write(&self.folder(frame), f64::from(frame) / self.fps, &cameras, done)?;
+            self.write((&mut directory, &self.folder(frame)), f64::from(frame) / self.fps, &cameras, done)?;
         }
         drop(progress);
+        directory.finish()?;
         let report = Simulated {
             output: self.out.clone(),
             frames: self.frames,
@@ -109,32 +111,32 @@ impl Simulate {
         console.report(&report, || report.text())
     }
 
+    /// Where a frame is in the directory.
     fn folder(&self, frame: u32) -> PathBuf {
-        if self.frames == 1 { self.out.clone() } else { self.out.join(frame_name(frame)) }
+        if self.frames == 1 { PathBuf::new() } else { frame_name(frame).into() }
     }
 
     /// One frame. Cameras and points come last: a capture that was stopped has none, and is not taken for one.
     fn write(
         &self,
-        folder: &Path,
+        (directory, folder): (&mut OutputDirectory, &Path),
         seconds: f64,
         cameras: &[Camera],
         done: impl Fn(u32),
     ) -> Result<(), Failure> {
         let simulation = Simulation { seed: self.seed, samples: self.samples };
-        make_directory(&folder.join("images"))?;
-        make_directory(&folder.join("sparse/0"))?;
         for (number, camera) in (1..).zip(cameras) {
-            let path = folder.join(CaptureFiles::picture_path(camera));
+            let name = folder.join(CaptureFiles::picture_path(camera));
+            let path = directory.path_of(&name);
             let failed = |error| Failure::other(format!("{}: cannot write: {error}", path.display()));
             let png = simulation.picture(camera, seconds).to_png().map_err(failed)?;
-            OutputFile::write(&path, &png)?;
+            directory.write(&name, &png)?;
             done(number);
         }
         let points = simulation.points(cameras, seconds, self.points);
         let mut files = CaptureFiles { cameras, points: &points, seconds }.files();
         files.reverse();
-        files.iter().try_for_each(|file| OutputFile::write(&folder.join(&file.path), &file.bytes))
+        files.iter().try_for_each(|file| directory.write(folder.join(&file.path), &file.bytes))
     }
 }
 

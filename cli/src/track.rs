@@ -4,14 +4,14 @@ mod report;
 
 use crate::cameras::{BackgroundArg, CameraArgs, UpName, Views};
 use crate::console::Console;
-use crate::decode::earlier_frames;
-use crate::earlier::Earlier;
+use crate::decode::frame_directory;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::frame_name::frame_name;
 use crate::input_args::InputArgs;
 use crate::numbers::{FrameRange, frames, parse_share};
-use crate::output_file::{OutputFile, check_directory, make_directory};
+use crate::output_directory::OutputDirectory;
+use crate::output_file::check_directory;
 use crate::progress::Progress;
 use clap::Args;
 use report::{Origin, Tracked, TrackedFrame};
@@ -21,7 +21,7 @@ use splatstream_encoder::FrameSource;
 use splatstream_files::ply;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// Frames that have at least this share of their Gaussians in common with the one before are sequences already.
@@ -86,7 +86,9 @@ pub(crate) struct Track {
     /// Keep frames that are there already, as an earlier run with the same settings left them.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
-    /// Remove frames of an earlier run from the directory: files that have the names that frames are given.
+    /// Replace the frames of an earlier run in the directory: files that have the names that frames are given. They go when all
+    /// new ones are whole, and stay where the command fails or is interrupted, which then leaves none of its own: the disk has to
+    /// hold both.
     #[arg(long)]
     force: bool,
     /// Chooses the views and the order of pictures.
@@ -103,11 +105,11 @@ impl Track {
         let mut files = FrameFiles::find(&self.inputs, self.reading)?;
         let inputs = self.files_read(&files);
         check_directory(&self.out, "frames of a sequence")?;
-        let mut earlier = match self.resume {
-            true => Earlier::default(),
-            false => earlier_frames(&self.out, &inputs, self.force)?,
-        };
         let span = self.span(files.len())?;
+        let mut directory = match self.resume {
+            true => OutputDirectory::resumed(&self.out, &inputs)?,
+            false => frame_directory(&self.out, &inputs, self.force)?,
+        };
         let first = span.first - span.first % self.gop;
         let mut report = Tracked::new(self.out.clone());
         let mut settings = Following::default();
@@ -118,19 +120,19 @@ impl Track {
             if number.is_multiple_of(self.gop) {
                 (settings, before) = (self.settings(&source)?, None);
             }
-            make_directory(&self.out)?;
-            earlier.remove()?;
             let start = before.take().filter(|before| !before.is_empty());
-            let path = self.out.join(format!("{}.ply", frame_name(number)));
+            let name = format!("{}.ply", frame_name(number));
+            let path = directory.path_of(&name);
             let tracked = match self.resume && path.is_file() {
                 true => TrackedFrame::kept(),
-                false => self.make(start, &source, &settings, (&path, &inputs), number)?,
+                false => self.make(start, &source, &settings, (&mut directory, &name), number)?,
             };
             // The next one starts from what is in the file, as it does when it is resumed.
-            let made = self.reading.frame(&path)?;
+            let made = self.reading.frame(&directory.place_of(&name))?;
             report.add(number, path, made.len(), tracked);
             before = Some(made);
         }
+        directory.finish()?;
         files.warnings().iter().for_each(|warning| console.complain(&warning.text()));
         report.finish(begin.elapsed());
         console.report(&report, || report.text())
@@ -178,12 +180,12 @@ impl Track {
         before: Option<GaussianFrame>,
         source: &GaussianFrame,
         settings: &Following,
-        (path, inputs): (&Path, &[PathBuf]),
+        (directory, name): (&mut OutputDirectory, &str),
         number: u32,
     ) -> Result<TrackedFrame, Failure> {
         let begin = Instant::now();
-        let keep = |origin, common| {
-            OutputFile::write_apart(path, inputs, &ply::write(source))?;
+        let mut keep = |origin, common| {
+            directory.write(name, &ply::write(source))?;
             Ok(TrackedFrame::source(origin, common))
         };
         let Some(before) = before.filter(|_| !source.is_empty()) else { return keep(Origin::Source, None) };
@@ -200,7 +202,7 @@ impl Track {
         let followed = followed.map_err(|error| Failure::other(format!("frame {number}: {error}")))?;
         let is_cut = followed.psnr_db < self.cut;
         let frame = if is_cut { source } else { &followed.frame };
-        OutputFile::write_apart(path, inputs, &ply::write(frame))?;
+        directory.write(name, &ply::write(frame))?;
         Ok(TrackedFrame {
             origin: if is_cut { Origin::Cut } else { Origin::Tracked },
             kept: false,

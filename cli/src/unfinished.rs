@@ -3,6 +3,9 @@
 
 #[cfg(target_os = "linux")]
 mod nameless;
+mod staging;
+
+pub(crate) use staging::{EARLIER, NEW, STAGING, Staging, files_below};
 
 use crate::failure::Failure;
 use std::fs::File;
@@ -16,6 +19,8 @@ static STATE: Mutex<State> = Mutex::new(State {
     is_listening: false,
     files: Vec::new(),
     directories: Vec::new(),
+    stagings: Vec::new(),
+    kept: Vec::new(),
     advice: None,
     stop: None,
 });
@@ -26,6 +31,10 @@ struct State {
     files: Vec<PathBuf>,
     /// Directories that the command has made, each after those above it.
     directories: Vec<PathBuf>,
+    /// Directories of files that take the places of others together.
+    stagings: Vec<PathBuf>,
+    /// Directories in which nothing was replaced after all.
+    kept: Vec<PathBuf>,
     /// What to do next.
     advice: Option<String>,
     /// Ends a command that can stop by itself and tell how far it came.
@@ -104,20 +113,17 @@ impl Drop for Unfinished {
 pub(crate) fn make_directory(path: &Path) -> io::Result<()> {
     let mut state = lock();
     let _deaf = listen(&mut state);
-    let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
-    let mut missing: Vec<PathBuf> = path.ancestors().take_while(is_missing).map(PathBuf::from).collect();
-    missing.reverse();
-    state.directories.extend(missing);
-    std::fs::create_dir_all(path)
+    state.make_directory(path)
 }
 
-/// The command has ended, and does what it was told (`is_done`) or has failed.
-pub(crate) fn end(is_done: bool) {
+/// The command has ended, and does what it was told (`is_done`) or has failed. Gives what is to be told of files that stay.
+pub(crate) fn end(is_done: bool) -> Vec<String> {
     let mut state = lock();
     match is_done {
         true => state.directories.clear(),
         false => state.remove_empty_directories(),
     }
+    state.kept_texts()
 }
 
 /// From now on a signal calls `stop`, and the command ends when it is ready to.
@@ -133,6 +139,19 @@ pub(crate) fn advise(advice: String) {
 }
 
 impl State {
+    fn make_directory(&mut self, path: &Path) -> io::Result<()> {
+        let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
+        let mut missing: Vec<PathBuf> = path.ancestors().take_while(is_missing).map(PathBuf::from).collect();
+        missing.reverse();
+        self.directories.extend(missing);
+        std::fs::create_dir_all(path)
+    }
+
+    /// What to tell of directories in which nothing was replaced.
+    fn kept_texts(&mut self) -> Vec<String> {
+        self.kept.drain(..).map(|home| staging::kept_text(&home)).collect()
+    }
+
     /// Removes the directories that the command has made, where nothing is in them.
     fn remove_empty_directories(&mut self) {
         for path in self.directories.drain(..).rev() {
@@ -162,8 +181,10 @@ fn interrupted() {
     for path in &state.files {
         let _gone_already = std::fs::remove_file(path);
     }
+    state.remove_stagings();
     state.remove_empty_directories();
-    let advice = state.advice.iter().map(|advice| format!("\n  {advice}")).collect::<String>();
+    let kept = state.kept_texts();
+    let advice: String = kept.iter().chain(&state.advice).map(|line| format!("\n  {line}")).collect();
     let _nobody_listens = writeln!(io::stderr().lock(), "interrupted: unfinished files are removed{advice}");
     std::process::exit(i32::from(Failure::Interrupted(String::new()).exit_code()));
 }

@@ -18,6 +18,9 @@ use std::path::PathBuf;
 #[derive(Serialize)]
 pub(super) struct Report {
     pub(super) output: Option<PathBuf>,
+    /// Whether nothing is written because frames of an earlier run are there.
+    #[serde(skip)]
+    pub(super) keeps_earlier: bool,
     pub(super) frames: u32,
     /// Frames that the stream says it has.
     pub(super) frames_in_stream: Option<u32>,
@@ -164,10 +167,16 @@ fn shows(sequence: &SequenceParameters, frame: &DecodedFrame) -> String {
 }
 
 impl Report {
+    /// The stream has an error, and frames of an earlier run stay.
+    pub(super) fn keep_earlier(&mut self) {
+        (self.output, self.keeps_earlier) = (None, true);
+    }
+
     /// The report for people.
     pub(super) fn text(&self) -> String {
         let output = match &self.output {
             Some(path) => path.display().to_string(),
+            None if self.keeps_earlier => "nothing written: frames of an earlier run stay".to_owned(),
             None => "nothing written (--dry-run)".to_owned(),
         };
         let of_stream = match self.frames_in_stream {

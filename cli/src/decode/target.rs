@@ -2,11 +2,11 @@
 
 use super::clamped::Losses;
 use super::format::Format;
-use crate::earlier::{Earlier, files_in};
 use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::frame_name::{frame_name, is_frame_name};
-use crate::output_file::{OutputFile, ends_with_separator, make_directory, refuse_terminal};
+use crate::output_directory::{OutputDirectory, files_in};
+use crate::output_file::{OutputFile, ends_with_separator, refuse_terminal};
 use crate::standard::{STANDARD, is_standard};
 use splatstream_gaussians::GaussianFrame;
 use std::io::{self, IsTerminal};
@@ -14,14 +14,16 @@ use std::path::{Path, PathBuf};
 
 /// Where frames go.
 pub(crate) struct Target {
-    path: PathBuf,
+    place: Place,
     format: Format,
-    is_directory: bool,
-    /// What no frame may replace.
-    inputs: Vec<PathBuf>,
-    /// Frames of an earlier run, removed with the first frame that is written.
-    stale: Earlier,
     losses: Losses,
+}
+
+/// A directory, or a file of one frame.
+enum Place {
+    Directory(OutputDirectory),
+    /// With what it may not replace.
+    File(PathBuf, Vec<PathBuf>),
 }
 
 /// What a user says about the files.
@@ -35,7 +37,7 @@ pub(crate) struct Wanted<'a> {
     pub(crate) format: Option<Format>,
     /// How many there will be; 0 if that is not known.
     pub(crate) frames: u32,
-    /// Whether frames of an earlier run are removed.
+    /// Whether frames of an earlier run are replaced.
     pub(crate) force: bool,
 }
 
@@ -62,45 +64,49 @@ impl Target {
         }
         let inputs = vec![wanted.input.to_path_buf()];
         Ok(Self {
-            path: path.to_path_buf(),
-            format: format.or(named).unwrap_or(Format::Ply),
-            is_directory,
-            stale: if is_directory {
-                earlier_frames(path, &inputs, wanted.force)?
-            } else {
-                Earlier::default()
+            place: match is_directory {
+                true => Place::Directory(frame_directory(path, &inputs, wanted.force)?),
+                false => Place::File(path.to_path_buf(), inputs),
             },
-            inputs,
+            format: format.or(named).unwrap_or(Format::Ply),
             losses: Losses::default(),
         })
     }
 
-    /// Writes one frame; the directory is made, or cleared, with the first.
+    /// Writes one frame.
     pub(crate) fn write(&mut self, number: u32, frame: &GaussianFrame) -> Result<(), Failure> {
-        if self.is_directory {
-            make_directory(&self.path)?;
+        let name = format!("{}.{}", frame_name(number), self.format.extension());
+        let bytes = self.format.bytes(frame).map_err(|error| {
+            let path = match &self.place {
+                Place::Directory(directory) => directory.path_of(&name),
+                Place::File(path, _) => path.clone(),
+            };
+            Failure::other(format!("{}: {error}", path.display()))
+        })?;
+        match &mut self.place {
+            Place::Directory(directory) => directory.write(name, &bytes)?,
+            Place::File(path, inputs) => OutputFile::write_apart(path, inputs, &bytes)?,
         }
-        self.stale.remove()?;
-        let path = self.path_of(number);
-        let bytes = self
-            .format
-            .bytes(frame)
-            .map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
-        OutputFile::write_apart(&path, &self.inputs, &bytes)?;
         self.losses.add(number, frame, self.format);
         Ok(())
+    }
+
+    /// Whether frames of an earlier run stay where this one does not finish.
+    pub(crate) fn replaces(&self) -> bool {
+        matches!(&self.place, Place::Directory(directory) if directory.replaces())
+    }
+
+    /// All frames are written.
+    pub(crate) fn finish(self) -> Result<(), Failure> {
+        match self.place {
+            Place::Directory(directory) => directory.finish(),
+            Place::File(..) => Ok(()),
+        }
     }
 
     /// What the format could not keep.
     pub(crate) fn warnings(&self) -> Vec<Warning> {
         self.losses.warnings(self.format)
-    }
-
-    fn path_of(&self, number: u32) -> PathBuf {
-        if !self.is_directory {
-            return self.path.clone();
-        }
-        self.path.join(format!("{}.{}", frame_name(number), self.format.extension()))
     }
 }
 
@@ -124,9 +130,14 @@ fn is_directory(path: &Path) -> Result<bool, Failure> {
     Ok(true)
 }
 
-/// The frames of an earlier run in a directory, if they may be removed (`force`); none of them may be among `inputs`.
-pub(crate) fn earlier_frames(path: &Path, inputs: &[PathBuf], force: bool) -> Result<Earlier, Failure> {
-    Earlier::of(path, files_in(path, is_frame), "frames", inputs, force)
+/// A directory for frames, in the places of those of an earlier run if they may be replaced (`force`); none of them may be
+/// among `inputs`.
+pub(crate) fn frame_directory(
+    path: &Path,
+    inputs: &[PathBuf],
+    force: bool,
+) -> Result<OutputDirectory, Failure> {
+    OutputDirectory::new(path, |path| files_in(path, is_frame), "frames", inputs, force)
 }
 
 /// Whether a file has a name that frames are given.

@@ -45,7 +45,12 @@ impl Captures {
 
     /// The file of a frame.
     pub(super) fn output(&self, out: &Path, number: u32) -> PathBuf {
-        if self.is_sequence { out.join(format!("{}.ply", frame_name(number))) } else { out.to_path_buf() }
+        if self.is_sequence { out.join(Self::file(number)) } else { out.to_path_buf() }
+    }
+
+    /// The name of the file of a frame of a sequence.
+    pub(super) fn file(number: u32) -> String {
+        format!("{}.ply", frame_name(number))
     }
 
     pub(super) fn read(&self, number: u32) -> Result<Capture, Failure> {

@@ -3,7 +3,7 @@
 use super::Report;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output_file::OutputFile;
+use crate::output_directory::OutputDirectory;
 use crate::standard::STANDARD;
 use crate::stream_file::{fault, open_pieces};
 use splatstream_format::Limits;
@@ -23,14 +23,15 @@ const PAUSE: Duration = Duration::from_millis(50);
 
 /// Packages a stream that is being made, until its end unit.
 pub(super) fn run(
-    (input, out): (&Path, &Path),
+    input: &Path,
+    directory: OutputDirectory,
     settings: &Settings,
     limits: &Limits,
     console: &Console,
 ) -> Result<(), Failure> {
     let mut reader = open_pieces(input)?;
     let mut live = Live::new(settings, limits);
-    let mut files = Files { out, media: 0, texts: BTreeMap::new(), gops: 0 };
+    let mut files = Files { directory, media: 0, texts: BTreeMap::new(), gops: 0 };
     let (mut piece, mut bytes_in) = (vec![0; PIECE], 0);
     while !live.has_ended() {
         let count = match reader.read(&mut piece) {
@@ -47,11 +48,11 @@ pub(super) fn run(
         }
         bytes_in += count as u64;
         let changes = live.push(&piece[..count], now_ms()).map_err(|error| fault(input, error))?;
-        files.apply(changes, input)?;
+        files.apply(changes)?;
     }
-    files.apply(live.finish(now_ms()).map_err(|error| fault(input, error))?, input)?;
+    files.apply(live.finish(now_ms()).map_err(|error| fault(input, error))?)?;
     let layout = settings.package.layout.name();
-    let report = Report::of_live(out, layout, bytes_in, files.bytes(), files.gops);
+    let report = Report::of_live(files.directory.path(), layout, bytes_in, files.bytes(), files.gops);
     console.report(&report, || report.text())
 }
 
@@ -62,8 +63,8 @@ fn now_ms() -> u64 {
 }
 
 /// The files so far.
-struct Files<'a> {
-    out: &'a Path,
+struct Files {
+    directory: OutputDirectory,
     /// Bytes of media.
     media: u64,
     /// Bytes of the files that are replaced, by name.
@@ -72,16 +73,18 @@ struct Files<'a> {
     gops: usize,
 }
 
-impl Files<'_> {
-    fn apply(&mut self, changes: Vec<Change>, input: &Path) -> Result<(), Failure> {
+impl Files {
+    fn apply(&mut self, changes: Vec<Change>) -> Result<(), Failure> {
         for Change { name, bytes, appends } in changes {
-            let path = self.out.join(&name);
+            // Players read these files while others come, and not together with those of an earlier package.
+            self.directory.clear()?;
             if appends {
+                let path = self.directory.path_of(&name);
                 let file = OpenOptions::new().append(true).open(&path);
                 let written = file.and_then(|mut file| file.write_all(&bytes));
                 written.map_err(|error| Failure::file("write", &path, &error))?;
             } else {
-                OutputFile::write_apart(&path, &[input.to_path_buf()], &bytes)?;
+                self.directory.write(&name, &bytes)?;
                 let number = name.strip_prefix("s0-").and_then(|rest| rest.strip_suffix(".m4s"));
                 self.gops += usize::from(number.is_some_and(|number| number.parse::<u64>().is_ok()));
             }

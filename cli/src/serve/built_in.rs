@@ -2,6 +2,7 @@
 
 use crate::demo;
 use crate::failure::Failure;
+use crate::output_file::OutputFile;
 use crate::package::{package, write};
 use crate::progress::Progress;
 use crate::stream_file::StreamFile;
@@ -30,6 +31,6 @@ pub(super) fn make(directory: &Path) -> Result<(), Failure> {
         .map_err(|error| Failure::other(error.to_string()))?;
     let stream = StreamFile { path: directory.join("built-in.gss"), bytes };
     let package = package(&stream, &Options::default(), &process::Options::default(), true)?;
-    write(&package, directory, &[])?;
+    write(&package, &mut |name| OutputFile::create(&directory.join(name), &[]))?;
     Ok(())
 }
