@@ -49,7 +49,7 @@ use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use warnings::unlike_frames;
+use warnings::{Warning, unlike_frames};
 
 /// Encode frames of Gaussians to a stream.
 ///
@@ -275,11 +275,16 @@ impl Encode {
         encoded.page_bytes = page_bytes;
         encoded.chosen.extend(decided.choices());
         encoded.warnings.extend(decided.warnings());
-        let unlike = source.likeness().unlike(inputs.len() > 1);
-        encoded.warnings.extend(unlike.and_then(|unlike| unlike_frames(&unlike, self.all_intra)));
+        encoded.warnings.extend(self.unlike(&source, inputs));
         encoded.warnings.extend(source.warnings());
         encoded.warnings.iter().for_each(|warning| console.complain(&warning.text()));
         Ok(encoded)
+    }
+
+    /// What is said of frames that were read and are hardly those of one sequence.
+    fn unlike(&self, source: &FrameFiles, inputs: &[PathBuf]) -> Option<Warning> {
+        let unlike = source.likeness().unlike(inputs.len() > 1)?;
+        unlike_frames(&unlike, self.all_intra, self.shards.option())
     }
 
     /// Memory that everything together may take, bytes.

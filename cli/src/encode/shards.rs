@@ -3,6 +3,7 @@
 use super::Encode;
 use super::failed::failed;
 use super::output::is_page;
+use super::warnings::Warning;
 use crate::console::Console;
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
@@ -54,6 +55,7 @@ struct Planned<'a> {
     most_shards: u32,
     digest: String,
     seconds: f64,
+    warnings: Vec<Warning>,
 }
 
 /// Where a shard is in its sequence.
@@ -78,6 +80,15 @@ impl ShardReport {
 impl ShardArgs {
     pub(super) const fn writes_plan(&self) -> bool {
         self.write_plan
+    }
+
+    /// The option by which the sequence is divided, if it is.
+    pub(super) const fn option(&self) -> Option<&'static str> {
+        match (self.write_plan, self.shard) {
+            (true, _) => Some("--write-plan"),
+            (_, Some(_)) => Some("--shard"),
+            _ => None,
+        }
     }
 
     /// The plan that is read, if there is one.
@@ -157,7 +168,7 @@ pub(super) fn write_plan(command: &Encode, console: &Console) -> Result<(), Fail
     let mut source = FrameFiles::find(&command.inputs, command.reading.within(memory))?.unchecked();
     let read = command.read_files(&source);
     refuse_inputs(out, &read)?;
-    let (settings, _) = command.settings_for(&mut source, (out, memory))?;
+    let (settings, decided) = command.settings_for(&mut source, (out, memory))?;
     let file = OutputFile::create(out, &read)?;
     let plan = plan(&mut source, &settings).map_err(|error| failed(&source, (out, memory), &error))?;
     let (most_shards, frames) = (plan.shards(), source.len());
@@ -168,7 +179,10 @@ pub(super) fn write_plan(command: &Encode, console: &Console) -> Result<(), Fail
     let text = serde_json::to_string_pretty(&plan).map_err(|error| Failure::other(error.to_string()))?;
     file.finish_with(format!("{text}\n").as_bytes())?;
     let seconds = start.elapsed().as_secs_f64();
-    let report = Planned { output: out, frames, gaussians, most_shards, digest, seconds };
+    let others = command.unlike(&source, &command.inputs).into_iter().chain(source.warnings());
+    let warnings: Vec<Warning> = decided.warnings().into_iter().chain(others).collect();
+    warnings.iter().for_each(|warning| console.complain(&warning.text()));
+    let report = Planned { output: out, frames, gaussians, most_shards, digest, seconds, warnings };
     console.report_beside(Some(out), &report, || {
         format!(
             "{}: {}, {}; for up to {}: --plan {0} --shard 1/N to N/N, with the same inputs and options\n",

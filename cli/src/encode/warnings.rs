@@ -72,10 +72,10 @@ pub(crate) fn warnings(
 }
 
 /// What is said of files that are hardly frames of one sequence; nothing where frames that do not predict each other are coded by
-/// themselves already.
-pub(super) fn unlike_frames(unlike: &Unlike, is_intra: bool) -> Option<Warning> {
+/// themselves already. `shards`: the option by which the sequence is divided, which scenes of their own are encoded without.
+pub(super) fn unlike_frames(unlike: &Unlike, is_intra: bool, shards: Option<&str>) -> Option<Warning> {
     let (fewest, most) = unlike.gaussians;
-    let mut message = "the files were encoded as the frames of one sequence, and have ".to_owned();
+    let mut message = "the files were taken for the frames of one sequence, and have ".to_owned();
     if fewest < most {
         let _infallible = write!(message, "from {} to ", grouped(fewest as u64));
     }
@@ -87,9 +87,10 @@ pub(super) fn unlike_frames(unlike: &Unlike, is_intra: bool) -> Option<Warning> 
         message += ", and places that do not touch";
     }
     let apart = "--all-intra codes each by itself, and splatstream track makes one sequence of frames that were trained apart";
-    let each = "if they are scenes of their own, give the files with --each -o DIR";
+    let without = shards.map(|option| format!(" and without {option}")).unwrap_or_default();
+    let each = format!("if they are scenes of their own, give the files with --each -o DIR{without}");
     let advice: Vec<&str> =
-        [(!is_intra).then_some(apart), unlike.is_unrelated.then_some(each)].into_iter().flatten().collect();
+        [(!is_intra).then_some(apart), unlike.is_unrelated.then_some(&each)].into_iter().flatten().collect();
     (!advice.is_empty()).then(|| Warning::new("unlike-frames", format!("{message}: {}", advice.join("; "))))
 }
 

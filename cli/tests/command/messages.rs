@@ -275,7 +275,8 @@ fn files_of_a_directory_that_are_hardly_one_sequence_are_told_from_those_that_ar
             let frame = GaussianFrame::from_planes(0, planes).unwrap();
             fs::write(folder.join(format!("f{number}.ply")), ply::write(&frame)).unwrap();
         }
-        let out = folder.with_extension("gss");
+        let is_plan = more.contains(&"--write-plan");
+        let out = folder.with_extension(if is_plan { "json" } else { "gss" });
         let encode = ["encode", text(&folder), "-o", text(&out), "--preset", "fast", "--psnr", "30"];
         let report = json(&[&encode[..], more].concat());
         let warnings = report["warnings"].as_array().unwrap().clone();
@@ -292,6 +293,8 @@ fn files_of_a_directory_that_are_hardly_one_sequence_are_told_from_those_that_ar
             said("others", &others, &[]),
             said("others-intra", &others, &["--all-intra"]),
             said("elsewhere", &[(90, 0.0), (90, 1e3)], &[]),
+            said("planned", &others, &["--write-plan"]),
+            said("shards", &others, &["--shard", "1/1"]),
         ]
         .join("\n")
     );
