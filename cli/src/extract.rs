@@ -4,14 +4,14 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::numbers::frames;
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
-use crate::short_frames::short_frames;
+use crate::short_frames::{layers_of, short_frames};
 use crate::stream_file::{LimitArgs, StreamFile};
-use crate::structure::{Frame, Structure};
 use clap::Args;
 use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_format::Limits;
+use splatstream_stream::structure::{Frame, Structure};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::slice;
@@ -81,7 +81,7 @@ impl Report {
         let (whole, part) = (Structure::of(&stream.bytes, limits), Structure::of(extracted, limits));
         let announced = whole.sequence.map(|sequence| sequence.frame_count).filter(|&count| count > 0);
         let there = frames_of(&whole).map(|frame| frame.index).collect();
-        let lost = whole.missing(&there, announced, OperatingPoint::ALL);
+        let lost = whole.missing(&there, announced, layers_of(OperatingPoint::ALL));
         let damaged: Vec<u32> =
             frames_of(&part).filter(|frame| is_damaged(frame)).map(|frame| frame.index).collect();
         let reduced = short_frames(&stream.bytes, &whole, command.op, !lost.is_empty(), limits);

@@ -42,7 +42,6 @@ mod short_frames;
 mod simulate;
 mod standard;
 mod stream_file;
-mod structure;
 mod track;
 mod train;
 mod unfinished;

@@ -1,9 +1,9 @@
 //! Frames that lack increments which were there once.
 
-use crate::structure::{Frame, Structure};
 use splatstream_decoder::operating_point::{OperatingPoint, operating_points};
 use splatstream_format::Limits;
 use splatstream_format::syntax::SequenceParameters;
+use splatstream_stream::structure::{Frame, Structure};
 use std::collections::BTreeSet;
 
 /// Display indices of frames that lack increments of an operating point, as far as the stream tells.
@@ -21,10 +21,10 @@ pub(crate) fn short_frames(
     limits: &Limits,
 ) -> BTreeSet<u32> {
     let Some(sequence) = &structure.sequence else { return BTreeSet::new() };
-    let listed = structure.points_up_to(point).max_by_key(|listed| listed.point);
+    let listed = structure.points_up_to(layers_of(point)).max_by_key(|listed| listed.point);
     let is_whole = match listed {
         Some(listed) => operating_points(bytes, limits).is_ok_and(|points| {
-            let found = points.iter().find(|info| info.point == listed.point);
+            let found = points.iter().find(|info| layers_of(info.point) == listed.point);
             found.is_some_and(|info| (info.bytes, info.frames) == (listed.bytes, listed.frames))
         }),
         None => structure.has_all_units(),
@@ -37,12 +37,23 @@ pub(crate) fn short_frames(
         temporal: sequence.temporal_layer_count.saturating_sub(1),
         refinement: sequence.refinement_count.saturating_sub(1),
     });
-    let known = listed.map_or_else(|| fullest(structure, announced), |listed| listed.point);
+    let known = listed.map_or_else(|| fullest(structure, announced), |listed| point_of(listed.point));
     let found = lacking(structure, sequence, known);
     match found.is_empty() && listed.is_none() && !has_lost {
         true => lacking(structure, sequence, announced),
         false => found,
     }
+}
+
+/// A point as its highest spatial layer, temporal layer and refinement, by which the structure of a stream lists it.
+pub(crate) const fn layers_of(point: OperatingPoint) -> (u8, u8, u8) {
+    let OperatingPoint { spatial, temporal, refinement } = point;
+    (spatial, temporal, refinement)
+}
+
+/// The point that is listed so.
+pub(crate) const fn point_of((spatial, temporal, refinement): (u8, u8, u8)) -> OperatingPoint {
+    OperatingPoint { spatial, temporal, refinement }
 }
 
 /// The frames up to the temporal layer of a point.

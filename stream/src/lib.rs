@@ -26,6 +26,7 @@ pub mod segments;
 #[cfg(feature = "server")]
 pub mod server;
 pub mod simulation;
+pub mod structure;
 pub mod unpackage;
 
 pub use representation::Representation;

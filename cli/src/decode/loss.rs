@@ -2,13 +2,13 @@
 
 use crate::failure::StreamFault;
 use crate::numbers::FrameRange;
-use crate::short_frames::short_frames;
+use crate::short_frames::{layers_of, point_of, short_frames};
 use crate::stream_file::StreamFile;
-use crate::structure::{Gop, Structure, add_run};
 use serde::Serialize;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::Summary;
+use splatstream_stream::structure::{Gop, Structure, add_run};
 use std::collections::BTreeSet;
 
 /// Errors, and frames that were never output.
@@ -42,14 +42,14 @@ impl Loss {
         if !summary.errors.is_empty() {
             let structure = Structure::of(&stream.bytes, &options.limits);
             let point = options.operating_point;
-            listed = structure.points_up_to(point).map(|listed| listed.point).max();
+            listed = structure.points_up_to(layers_of(point)).map(|listed| point_of(listed.point)).max();
             // Frames of which not even a header is left, and, where decoding did not go on after the first error, only those
             // after the last GOP that there is.
             let after = match options.stop_at_first_error {
                 true => structure.gops.iter().map(Gop::end).max().unwrap_or(0),
                 false => frames.first,
             };
-            let missing = structure.missing(shown, (announced > 0).then_some(announced), point);
+            let missing = structure.missing(shown, (announced > 0).then_some(announced), layers_of(point));
             let later = |(first, last): (u32, u32)| Some((first.max(after), last)).filter(|_| last >= after);
             found.extend(missing.into_iter().filter_map(later));
             found.sort_unstable();

@@ -7,10 +7,10 @@ use super::Shown;
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault};
 use crate::stream_file::StreamFile;
-use crate::structure::{Frame, Gop, Increment, Structure, Tool};
 use serde::Serialize;
 use splatstream_format::Limits;
-use splatstream_format::syntax::{Profile, SequenceParameters};
+use splatstream_format::syntax::Profile;
+use splatstream_stream::structure::{self, Frame, Gop, Increment, Structure, Tool};
 
 /// What `--json` prints.
 #[derive(Serialize)]
@@ -121,6 +121,13 @@ impl GopRow {
     }
 }
 
+impl From<structure::Need> for Need {
+    fn from(need: structure::Need) -> Self {
+        let structure::Need { frame, spatial_layer, refinement, unit } = need;
+        Self { frame, spatial_layer, refinement, unit }
+    }
+}
+
 impl From<&Tool> for ToolRow {
     fn from(tool: &Tool) -> Self {
         Self {
@@ -145,7 +152,7 @@ impl FrameRow {
             spatial_layer: increment.header.spatial_layer,
             refinement: increment.header.refinement,
             damaged: increment.span.damaged,
-            needs: needs(structure, gop, frame, increment),
+            needs: structure.needs(gop, frame, increment).into_iter().map(Need::from).collect(),
             codebooks: increment.tools.codebooks.clone(),
             weights: increment.tools.weights,
         };
@@ -161,31 +168,4 @@ impl FrameRow {
             units: frame.increments.iter().map(unit).collect(),
         }
     }
-}
-
-/// What an increment needs at once: the refinement before it; in an I frame its parents, one layer below; in other frames
-/// the same refinement of the reference frame, or all units of a whole anchor, which the last of them stands for.
-fn needs(structure: &Structure, gop: &Gop, frame: &Frame, increment: &Increment) -> Vec<Need> {
-    let (spatial, refinement) = (increment.header.spatial_layer, increment.header.refinement);
-    let mut needs = Vec::new();
-    let mut add = |index: u32, spatial_layer: u8, refinement: u8| {
-        let unit = gop.frame(index).and_then(|frame| frame.unit(spatial_layer, refinement));
-        needs.push(Need { frame: index, spatial_layer, refinement, unit });
-    };
-    if let Some(before) = refinement.checked_sub(1) {
-        add(frame.index, spatial, before);
-    }
-    let whole_anchor = structure.sequence.filter(SequenceParameters::whole_anchor);
-    match (gop.reference(frame), whole_anchor) {
-        (None, _) => {
-            if let Some(below) = spatial.checked_sub(1) {
-                add(frame.index, below, refinement);
-            }
-        }
-        (Some(index), Some(sequence)) if index == gop.first_frame => {
-            add(index, structure.top(), sequence.refinement_count.saturating_sub(1));
-        }
-        (Some(index), _) => add(index, structure.top(), refinement),
-    }
-    needs
 }

@@ -1,7 +1,6 @@
-//! The GOPs and frames of a stream and the units that they are made of, from headers alone. Works on damaged and on cut
-//! streams, in time linear in the number of units.
+//! The GOPs and frames of a stream, the units that they are made of, and what these need of each other, from headers alone.
+//! Works on damaged and on cut streams, in time linear in the number of units.
 
-use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_format::follower::{Content, Follower, Standing};
 use splatstream_format::syntax::{
     EndOfStream, FrameHeader, FrameRole, GopHeader, OperatingPointEntry, Profile, SequenceParameters,
@@ -12,102 +11,131 @@ use splatstream_format::{Error, Limits, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What a stream is made of.
-#[derive(Default)]
-pub(crate) struct Structure {
+#[derive(Debug, Default)]
+pub struct Structure {
     /// The profile, if there is a file header.
-    pub(crate) profile: Option<Profile>,
+    pub profile: Option<Profile>,
     /// The sequence parameters, if they have come.
-    pub(crate) sequence: Option<SequenceParameters>,
+    pub sequence: Option<SequenceParameters>,
     /// The GOPs.
-    pub(crate) gops: Vec<Gop>,
+    pub gops: Vec<Gop>,
     /// The operating points that it lists.
-    pub(crate) points: Vec<Listed>,
+    pub points: Vec<Listed>,
     /// How many units the end unit counts before it, and how many there are; none before the end unit.
     units: Option<(u32, usize)>,
     /// The first error of headers, checksums and lengths.
-    pub(crate) error: Option<Error>,
+    pub error: Option<Error>,
     /// Whether units belong to the last GOP: not after a damaged gop_header.
     in_gop: bool,
     definitions: Definitions,
 }
 
 /// An operating point as the stream lists it.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Listed {
-    pub(crate) point: OperatingPoint,
-    /// Frames of the stream at the point, and bytes of their units and of those of their GOPs.
-    pub(crate) frames: u32,
-    pub(crate) bytes: u64,
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Listed {
+    /// Its highest spatial layer, temporal layer and refinement, each counted from 0.
+    pub point: (u8, u8, u8),
+    /// Frames of the stream at the point.
+    pub frames: u32,
+    /// Bytes of their units and of those of their GOPs.
+    pub bytes: u64,
 }
 
 /// Where a unit is.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct UnitSpan {
+pub struct UnitSpan {
     /// Counted from 0.
-    pub(crate) unit: usize,
+    pub unit: usize,
     /// Offset of its header.
-    pub(crate) at: u64,
+    pub at: u64,
     /// Header and payload.
-    pub(crate) bytes: u64,
+    pub bytes: u64,
     /// Whether its header or its payload is not the one that was written.
-    pub(crate) damaged: bool,
+    pub damaged: bool,
 }
 
 /// A group of pictures.
-pub(crate) struct Gop {
-    pub(crate) span: UnitSpan,
-    pub(crate) header: GopHeader,
+#[derive(Debug)]
+pub struct Gop {
+    /// Its gop_header.
+    pub span: UnitSpan,
+    /// What that says.
+    pub header: GopHeader,
     /// Display index of the first frame.
-    pub(crate) first_frame: u32,
+    pub first_frame: u32,
     /// Transforms, codebooks and weights.
-    pub(crate) tools: Vec<Tool>,
-    pub(crate) frames: Vec<Frame>,
+    pub tools: Vec<Tool>,
+    /// The frames whose headers came, in the order of the stream.
+    pub frames: Vec<Frame>,
     /// Where in `frames` the frame with a display index is.
     by_index: BTreeMap<u32, usize>,
 }
 
 /// A transform, codebook or weights unit.
-pub(crate) struct Tool {
-    pub(crate) span: UnitSpan,
-    pub(crate) unit_type: UnitType,
-    pub(crate) temporal_layer: u8,
+#[derive(Debug)]
+pub struct Tool {
+    /// Where it is.
+    pub span: UnitSpan,
+    /// What it is.
+    pub unit_type: UnitType,
+    /// The temporal layer from which on it is needed.
+    pub temporal_layer: u8,
     /// Frames of the GOP that stand before it.
-    pub(crate) frames_before: usize,
+    pub frames_before: usize,
 }
 
 /// A frame.
-pub(crate) struct Frame {
+#[derive(Debug)]
+pub struct Frame {
     /// Display index.
-    pub(crate) index: u32,
-    pub(crate) span: UnitSpan,
+    pub index: u32,
+    /// Its frame_header.
+    pub span: UnitSpan,
     /// Type, temporal layer and reference.
-    pub(crate) role: FrameRole,
+    pub role: FrameRole,
     /// The transform units that its header names.
-    pub(crate) transforms: Vec<usize>,
+    pub transforms: Vec<usize>,
     /// Increments.
-    pub(crate) increments: Vec<Increment>,
+    pub increments: Vec<Increment>,
     /// The number of the unit of each spatial layer and refinement.
     by_layer: BTreeMap<(u8, u8), usize>,
 }
 
 /// An increment.
-pub(crate) struct Increment {
-    pub(crate) span: UnitSpan,
-    pub(crate) header: UnitHeader,
-    pub(crate) tools: UsedTools,
+#[derive(Debug)]
+pub struct Increment {
+    /// Where it is.
+    pub span: UnitSpan,
+    /// Its unit_header.
+    pub header: UnitHeader,
+    /// The tools that it uses.
+    pub tools: UsedTools,
+}
+
+/// An increment that another needs; those that this one needs are needed too.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Need {
+    /// Display index of its frame.
+    pub frame: u32,
+    /// Its spatial layer.
+    pub spatial_layer: u8,
+    /// Its refinement.
+    pub refinement: u8,
+    /// The number of its unit; none if it is not in the stream.
+    pub unit: Option<usize>,
 }
 
 /// The tool units that an increment uses.
-#[derive(Default)]
-pub(crate) struct UsedTools {
+#[derive(Debug, Default)]
+pub struct UsedTools {
     /// Codebook units.
-    pub(crate) codebooks: Vec<usize>,
+    pub codebooks: Vec<usize>,
     /// The weights unit of the GOP, if new Gaussians have predictors.
-    pub(crate) weights: Option<usize>,
+    pub weights: Option<usize>,
 }
 
 /// The units that hold the definitions in force.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Definitions {
     dc: [Option<usize>; 16],
     sh: [Option<usize>; 16],
@@ -117,31 +145,31 @@ struct Definitions {
 
 impl Gop {
     /// Display index of the frame that a frame refers to.
-    pub(crate) fn reference(&self, frame: &Frame) -> Option<u32> {
+    pub fn reference(&self, frame: &Frame) -> Option<u32> {
         frame.role.reference.and_then(|index| self.first_frame.checked_add(index))
     }
 
     /// A frame by its display index.
-    pub(crate) fn frame(&self, index: u32) -> Option<&Frame> {
+    pub fn frame(&self, index: u32) -> Option<&Frame> {
         self.by_index.get(&index).and_then(|&at| self.frames.get(at))
     }
 
     /// The display index after those that it announces.
-    pub(crate) fn end(&self) -> u32 {
+    pub fn end(&self) -> u32 {
         self.first_frame.saturating_add(self.header.gop_frame_count)
     }
 }
 
 impl Frame {
     /// The number of the unit of a spatial layer and refinement.
-    pub(crate) fn unit(&self, spatial_layer: u8, refinement: u8) -> Option<usize> {
+    pub fn unit(&self, spatial_layer: u8, refinement: u8) -> Option<usize> {
         self.by_layer.get(&(spatial_layer, refinement)).copied()
     }
 }
 
 impl Structure {
     /// Reads a stream. Where the end of a unit is not known it goes on at the next intact gop_header.
-    pub(crate) fn of(bytes: &[u8], limits: &Limits) -> Self {
+    pub fn of(bytes: &[u8], limits: &Limits) -> Self {
         let mut structure = Self::default();
         let stream = match Stream::open(bytes, limits) {
             Ok(stream) => stream,
@@ -156,7 +184,7 @@ impl Structure {
             match unit {
                 Ok(unit) => {
                     structure.unit(&unit, number, &mut follower);
-                    number += 1;
+                    number = number.saturating_add(1);
                 }
                 Err(error) => {
                     structure.note(Err(error));
@@ -170,31 +198,58 @@ impl Structure {
     }
 
     /// The highest spatial layer, that of predicted frames.
-    pub(crate) fn top(&self) -> u8 {
+    pub fn top(&self) -> u8 {
         self.sequence.map_or(0, |sequence| sequence.spatial_layer_count.saturating_sub(1))
     }
 
-    /// Whether there are as many units as the end unit counts.
-    pub(crate) fn has_all_units(&self) -> bool {
-        self.units.is_some_and(|(counted, there)| counted as usize == there)
+    /// What an increment of a frame of a GOP needs at once, by clauses 7.1 to 7.7: the refinement before it; in an I frame its
+    /// parents, one layer below; in other frames the same refinement of the reference frame, or all units of a whole anchor,
+    /// which the last of them stands for.
+    pub fn needs(&self, gop: &Gop, frame: &Frame, increment: &Increment) -> Vec<Need> {
+        let (spatial, refinement) = (increment.header.spatial_layer, increment.header.refinement);
+        let mut needs = Vec::new();
+        let mut add = |index: u32, spatial_layer: u8, refinement: u8| {
+            let unit = gop.frame(index).and_then(|frame| frame.unit(spatial_layer, refinement));
+            needs.push(Need { frame: index, spatial_layer, refinement, unit });
+        };
+        if let Some(before) = refinement.checked_sub(1) {
+            add(frame.index, spatial, before);
+        }
+        let whole_anchor = self.sequence.filter(SequenceParameters::whole_anchor);
+        match (gop.reference(frame), whole_anchor) {
+            (None, _) => {
+                if let Some(below) = spatial.checked_sub(1) {
+                    add(frame.index, below, refinement);
+                }
+            }
+            (Some(index), Some(sequence)) if index == gop.first_frame => {
+                add(index, self.top(), sequence.refinement_count.saturating_sub(1));
+            }
+            (Some(index), _) => add(index, self.top(), refinement),
+        }
+        needs
     }
 
-    /// The listed points up to `point`.
-    pub(crate) fn points_up_to(&self, point: OperatingPoint) -> impl Iterator<Item = Listed> {
+    /// Whether there are as many units as the end unit counts.
+    pub fn has_all_units(&self) -> bool {
+        self.units.is_some_and(|(counted, there)| usize::try_from(counted) == Ok(there))
+    }
+
+    /// The listed points up to `point`: its highest spatial layer, temporal layer and refinement.
+    pub fn points_up_to(&self, point: (u8, u8, u8)) -> impl Iterator<Item = Listed> {
+        let (spatial, temporal, refinement) = point;
         self.points.iter().copied().filter(move |Listed { point: listed, .. }| {
-            listed.spatial <= point.spatial
-                && listed.temporal <= point.temporal
-                && listed.refinement <= point.refinement
+            listed.0 <= spatial && listed.1 <= temporal && listed.2 <= refinement
         })
     }
 
     /// First and last display index of each run of frames that the stream says it has at a point and that are not
     /// `there`. Where it does not say how many it has (`announced`), none is missing after the last one.
-    pub(crate) fn missing(
+    pub fn missing(
         &self,
         there: &BTreeSet<u32>,
         announced: Option<u32>,
-        point: OperatingPoint,
+        point: (u8, u8, u8),
     ) -> Vec<(u32, u32)> {
         let end = announced.unwrap_or_else(|| there.last().map_or(0, |last| last.saturating_add(1)));
         let layer = self.temporal_layer(point);
@@ -204,7 +259,7 @@ impl Structure {
             let mut next = next;
             for &index in there.range(next.min(end)..end).chain([&end]) {
                 if index > next {
-                    add_run(&mut missing, next, index - 1);
+                    add_run(&mut missing, next, index.saturating_sub(1));
                 }
                 next = index.saturating_add(1);
             }
@@ -213,9 +268,10 @@ impl Structure {
         for gop in self.gops.iter().filter(|gop| gop.header.is_predicted()) {
             between(next, gop.first_frame.min(end));
             for index in next.max(gop.first_frame)..gop.end().min(end) {
-                let is_of_point = gop.header.role(index - gop.first_frame).temporal_layer <= layer;
+                let is_of_point =
+                    gop.header.role(index.saturating_sub(gop.first_frame)).temporal_layer <= layer;
                 if is_of_point && !there.contains(&index) {
-                    between(index, index + 1);
+                    between(index, index.saturating_add(1));
                 }
             }
             next = next.max(gop.end());
@@ -226,15 +282,15 @@ impl Structure {
 
     /// The highest temporal layer of which the stream has frames at a point. Points of an extracted stream are listed with
     /// temporal layers that are no longer there, but not with their frames.
-    fn temporal_layer(&self, point: OperatingPoint) -> u8 {
+    fn temporal_layer(&self, point: (u8, u8, u8)) -> u8 {
         match self.points_up_to(point).max_by_key(|listed| listed.point) {
             Some(Listed { frames, .. }) => {
                 let as_many = self.points_up_to(point).filter(|listed| listed.frames == frames);
-                as_many.map(|listed| listed.point.temporal).min().unwrap_or(0)
+                as_many.map(|listed| listed.point.1).min().unwrap_or(0)
             }
             None => {
                 let frames = self.gops.iter().flat_map(|gop| &gop.frames);
-                frames.map(|frame| frame.role.temporal_layer).max().unwrap_or(0).min(point.temporal)
+                frames.map(|frame| frame.role.temporal_layer).max().unwrap_or(0).min(point.1)
             }
         }
     }
@@ -297,10 +353,10 @@ impl Structure {
                 self.add_frame(&unit.header, span, self.definitions.transforms(&header));
             }
             Content::OperatingPoints(points) => {
-                let point = |entry: &OperatingPointEntry| {
-                    let (spatial, temporal, refinement) = entry.key();
-                    let point = OperatingPoint { spatial, temporal, refinement };
-                    Listed { point, frames: entry.frame_count, bytes: entry.byte_count }
+                let point = |entry: &OperatingPointEntry| Listed {
+                    point: entry.key(),
+                    frames: entry.frame_count,
+                    bytes: entry.byte_count,
                 };
                 self.points = points.entries.iter().map(point).collect();
             }
@@ -361,7 +417,7 @@ impl Structure {
 }
 
 /// Adds a run of indices to runs, of which those that touch are joined.
-pub(crate) fn add_run(runs: &mut Vec<(u32, u32)>, first: u32, last: u32) {
+pub fn add_run(runs: &mut Vec<(u32, u32)>, first: u32, last: u32) {
     match runs.last_mut() {
         Some((_, end)) if end.saturating_add(1) >= first => *end = last.max(*end),
         _ => runs.push((first, last)),
@@ -399,7 +455,7 @@ impl Definitions {
 
 impl UnitSpan {
     fn new(unit: usize, of: &Unit<'_>, damaged: bool) -> Self {
-        let bytes = UnitHeader::SIZE as u64 + of.payload.len() as u64;
+        let bytes = u64::try_from(UnitHeader::SIZE.saturating_add(of.payload.len())).unwrap_or(u64::MAX);
         Self { unit, at: of.at, bytes, damaged }
     }
 }
