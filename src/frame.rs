@@ -95,7 +95,9 @@ impl Frame {
 
     /// Whether it shows less than the operating point asks for, or may, because units of it or of a frame that it refers to are
     /// damaged, or did not come before the end of the bytes or an error that cost the rest of its GOP. Units that are missing
-    /// without a trace do not count: an extracted stream lacks those of higher points too.
+    /// without a trace do not count: an extracted stream lacks those of higher points too. Where such a stream is cut between two
+    /// units, its last frame is called reduced even if all that was extracted of it is there, since only the operating_points unit
+    /// says which point that was, and it stands behind all frames; whoever knows the point asks for it.
     pub fn is_reduced(&self) -> bool {
         self.is_reduced
     }

@@ -30,7 +30,9 @@ pub struct DecodedFrame {
     pub is_lost: bool,
     /// Whether the frame shows less than its operating point asks for, or may: units of it, or of a frame that it refers to, are
     /// damaged or did not come before the end of the bytes or an error that ends the GOP. Of units that are missing without a
-    /// trace nothing is known: an extracted stream lacks those of higher points too.
+    /// trace nothing is known: an extracted stream lacks those of higher points too. Where such a stream is cut between two units, its
+    /// last frame is called reduced even if all that was extracted of it is there, since only the operating_points unit says which
+    /// point that was, and it stands behind all frames; whoever knows the point asks for it.
     pub is_reduced: bool,
     /// Digest of the exact lists; none if digests are not verified or there is no exact list.
     pub digest: Option<u64>,

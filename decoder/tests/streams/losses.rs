@@ -1,11 +1,11 @@
 //! Clauses 7.1.4 to 7.1.6: what errors cost, wherever they are. Single cases are vectors (`loss`, `order`).
 
 use crate::write::{Plan, Script, decoded};
-use splatstream_decoder::operating_point::OperatingPoint;
+use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::process::{DecodedFrame, Options};
 use splatstream_decoder::stream::Summary;
-use splatstream_format::Class;
 use splatstream_format::syntax::{UnitHeader, UnitType};
+use splatstream_format::{Class, Limits};
 
 fn codes(summary: &Summary) -> Vec<&'static str> {
     summary.errors.iter().map(|error| error.kind.code()).collect()
@@ -63,6 +63,15 @@ fn a_frame_that_has_what_its_point_asks_for_is_not_reduced() {
         let (_, frames) = decoded(cut, &Options { operating_point, ..Options::default() });
         let found: Vec<_> = frames.iter().map(|frame| (frame.level, frame.is_reduced)).collect();
         assert_eq!(found, [(refinement.min(1) + 1, is_reduced)]);
+    }
+    // What was extracted says nothing of its point before its last frame: who knows it asks for it.
+    let point = OperatingPoint { refinement: 1, ..OperatingPoint::ALL };
+    let extracted = extract(&bytes, point, &Limits::default()).unwrap();
+    let end = script.offsets()[increments[2]];
+    assert_eq!(extracted[..end], bytes[..end]);
+    for (operating_point, is_reduced) in [(point, false), (OperatingPoint::ALL, true)] {
+        let (_, frames) = decoded(&extracted[..end], &Options { operating_point, ..Options::default() });
+        assert_eq!((frames[0].level, frames[0].is_reduced), (2, is_reduced));
     }
 }
 
