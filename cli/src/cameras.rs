@@ -123,8 +123,13 @@ impl FromStr for Views {
 impl Views {
     /// The files that they are read from, with the pictures that these name; none where they are made.
     pub(crate) fn files(&self) -> Vec<PathBuf> {
+        self.files_with(None)
+    }
+
+    /// The same where the pictures are in a directory of their own.
+    pub(crate) fn files_with(&self, images: Option<&Path>) -> Vec<PathBuf> {
         match self {
-            Self::File(path) => files_at(path),
+            Self::File(path) => files_at(path, images),
             Self::Ring(_) | Self::Forward(_) => Vec::new(),
         }
     }

@@ -9,9 +9,9 @@ const PLACES: [&str; 3] = ["", "sparse/0", "sparse"];
 const MODEL: [&str; 6] =
     ["cameras.bin", "cameras.txt", "images.bin", "images.txt", "points3D.bin", "points3D.txt"];
 
-/// The files of the capture at a path, as far as it can be read.
-pub(crate) fn files_at(path: &Path) -> Vec<PathBuf> {
-    files_of(path, &read_views(path).unwrap_or_default(), None)
+/// The files of the capture at a path, as far as it can be read; its pictures are in `images`, if not where it says.
+pub(crate) fn files_at(path: &Path, images: Option<&Path>) -> Vec<PathBuf> {
+    files_of(path, &read_views(path).unwrap_or_default(), images)
 }
 
 /// The files of the capture that was read from a path; its pictures are in `images`, if not where it says. Some of them

@@ -294,7 +294,7 @@ impl Encode {
 
     /// Every file that is read: frames, cameras, a network.
     fn read_files(&self, source: &FrameFiles) -> Vec<PathBuf> {
-        let cameras = self.cameras.iter().flat_map(Views::files);
+        let cameras = self.cameras.iter().flat_map(|views| views.files_with(self.finetune.images()));
         let network = match &self.network {
             Some(NetworkName::File(path)) => Some(path),
             _ => None,

@@ -156,7 +156,8 @@ impl FrameFiles {
 
     /// The files that are read, which no output may replace: those of scenes that are directories one by one.
     pub(crate) fn inputs(&self) -> Vec<PathBuf> {
-        self.paths.iter().flat_map(|path| files_of(path)).collect()
+        let standard = self.spooled.iter().map(|_| PathBuf::from(STANDARD));
+        self.paths.iter().flat_map(|path| files_of(path)).chain(standard).collect()
     }
 
     /// Whether the frames that were read look like frames of one sequence.
@@ -189,7 +190,7 @@ impl FrameFiles {
 /// A directory that cannot be read or has no frames.
 pub(crate) fn inputs_of(named: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut inputs = Vec::new();
-    for path in named.iter().filter(|path| path.as_path() != Path::new(STANDARD)) {
+    for path in named {
         let frames = if is_folder(path) { frames_in(path)? } else { vec![path.clone()] };
         inputs.extend(frames.iter().flat_map(|path| files_of(path)));
     }
@@ -373,7 +374,7 @@ mod tests {
         let [archive, meta] = [directory.path().join("broken.zip"), sog.join(SOG_META)];
         [&archive, &meta].into_iter().for_each(|path| std::fs::write(path, "no scene").unwrap());
         let named = [Path::new(STANDARD), &archive, &folder, &sog].map(Path::to_path_buf);
-        assert_eq!(inputs_of(&named).unwrap(), [archive, meta.clone(), meta]);
+        assert_eq!(inputs_of(&named).unwrap(), [Path::new(STANDARD), &archive, &meta, &meta]);
         assert!(inputs_of(&[directory.path().join("frames/a.sog/none"), folder]).is_ok());
     }
 }

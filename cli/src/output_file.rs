@@ -2,7 +2,7 @@
 //! reads, a directory or a device; what is at the end of a symbolic link is replaced, not the link.
 
 use crate::failure::Failure;
-use crate::standard::is_standard;
+use crate::standard::{STANDARD, behind_input, behind_output, is_standard};
 use crate::unfinished::{self, Unfinished};
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, IsTerminal, Write};
@@ -26,6 +26,7 @@ impl OutputFile {
     pub(crate) fn create(path: &Path, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let (writer, unfinished): (Box<dyn Write>, _) = if is_standard(path) {
             refuse_terminal(io::stdout().is_terminal(), path)?;
+            refuse_inputs(path, inputs)?;
             (Box::new(io::stdout()), None)
         } else {
             refuse_inputs(path, inputs)?;
@@ -106,13 +107,14 @@ pub(crate) fn refuse_standard(path: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Nobody wants to lose what a command reads to what it writes.
+/// Nobody wants to lose what a command reads to what it writes, also where a shell has opened either.
 pub(crate) fn refuse_inputs(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
     if inputs.iter().any(|input| is_same_file(path, input)) {
-        let path = path.display();
-        return Err(Failure::Usage(format!(
-            "{path}: this command reads that file; give the output another name"
-        )));
+        let what = match is_standard(path) {
+            true => "this command reads the file that standard output goes to; send it to another",
+            false => "this command reads that file; give the output another name",
+        };
+        return Err(Failure::Usage(format!("{}: {what}", path.display())));
     }
     Ok(())
 }
@@ -237,11 +239,17 @@ fn end_of_links(path: &Path) -> Result<PathBuf, Failure> {
     Err(Failure::other(format!("{}: too many symbolic links", path.display())))
 }
 
-/// Whether two names lead to one file; devices are no files that could be lost.
-fn is_same_file(a: &Path, b: &Path) -> bool {
-    let (Ok(a_found), Ok(b_found)) = (a.metadata(), b.metadata()) else { return false };
-    let is_one = a.canonicalize().ok() == b.canonicalize().ok();
-    a_found.is_file() && (is_one || is_same_inode(&a_found, &b_found))
+/// Whether the names of an output and of an input lead to one file; devices are no files that could be lost.
+fn is_same_file(output: &Path, input: &Path) -> bool {
+    let found = if is_standard(output) { behind_output() } else { output.metadata().ok() };
+    let Some(found) = found.filter(Metadata::is_file) else { return false };
+    let redirected = if input == Path::new(STANDARD) { behind_input() } else { None };
+    let is_named = |named: Metadata| {
+        let is_one = || output.canonicalize().is_ok_and(|path| input.canonicalize().ok() == Some(path));
+        is_same_inode(&found, &named) || is_one()
+    };
+    redirected.is_some_and(|redirected| is_same_inode(&found, &redirected))
+        || input.metadata().is_ok_and(is_named)
 }
 
 #[cfg(unix)]

@@ -4,7 +4,8 @@ use super::Encode;
 use super::encoded::Encoded;
 use crate::console::Console;
 use crate::failure::Failure;
-use crate::output_file::{check_directory, make_directory};
+use crate::frame_files::inputs_of;
+use crate::output_file::{check_directory, make_directory, refuse_inputs};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,10 +31,16 @@ pub(super) fn run(command: &Encode, console: &Console) -> Result<(), Failure> {
     check_directory(&command.out, "the streams of --each")?;
     let outputs = outputs(command)?;
     make_directory(&command.out)?;
+    // What cannot be read is told where it is encoded.
+    let files_of = |input| inputs_of(slice::from_ref(input)).unwrap_or_default();
+    let files: Vec<PathBuf> = command.inputs.iter().flat_map(files_of).collect();
     let mut report = Report { output: &command.out, streams: Vec::new(), failed: Vec::new() };
     let mut first = None;
     for (input, out) in command.inputs.iter().zip(&outputs) {
-        match command.one(console, slice::from_ref(input), out) {
+        // No stream replaces a scene that comes after it.
+        let encoded =
+            refuse_inputs(out, &files).and_then(|()| command.one(console, slice::from_ref(input), out));
+        match encoded {
             Ok(encoded) => report.streams.push(encoded),
             Err(failure) => {
                 let message = failure.to_string();

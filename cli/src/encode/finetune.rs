@@ -152,6 +152,11 @@ impl From<AttributeName> for Attribute {
 }
 
 impl FinetuneArgs {
+    /// Where photographs are, if some are given.
+    pub(super) fn images(&self) -> Option<&Path> {
+        self.images.as_deref()
+    }
+
     /// The time that a preset and iterations are to be chosen for, seconds; none: they are given, or the usual ones.
     ///
     /// # Errors

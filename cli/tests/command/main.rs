@@ -15,6 +15,7 @@ mod finetune_state;
 mod fit;
 mod inspect;
 mod json_reports;
+mod kept_inputs;
 #[cfg(unix)]
 mod live;
 mod manual;
