@@ -11,6 +11,7 @@ use crate::frame_files::{FrameFiles, inputs_of, unread};
 use crate::input_args::InputArgs;
 use crate::memory_bound::{MemoryArgs, MemoryBound, bytes_of};
 use crate::numbers::parse_frame_rate;
+use crate::output_directory::refuse_others;
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::over_limit::allow;
 use crate::progress::Progress;
@@ -123,6 +124,7 @@ impl Chart {
     /// Measures every scene, then writes.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "charts")?;
+        refuse_others(&self.out, &["index.html"], &["points.csv", "stability.csv"])?;
         make_directory(&self.out)?;
         let inputs = self.inputs()?;
         if self.stability {

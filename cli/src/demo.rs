@@ -9,6 +9,7 @@ use crate::failure::Failure;
 use crate::frame_name::frame_name;
 use crate::memory_bound::{MemoryArgs, MemoryBound, bytes_of_gaussians};
 use crate::numbers::{counted, frames as frames_in_words};
+use crate::output_directory::refuse_others;
 use crate::output_file::{OutputFile, check_directory, make_directory};
 use crate::progress::Progress;
 use clap::Args;
@@ -72,6 +73,9 @@ impl Demo {
     /// Makes, encodes, decodes, verifies, reports.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "files of the demo")?;
+        // What comes after the stream; a run that was ended before has left only frames of the source.
+        let later = [PAGE, "report.json", "report.txt", "decoded/frame_0000.ply", "pictures/source.png"];
+        refuse_others(&self.out, &later, &[STREAM])?;
         let tracking = if self.untracked { Tracking::Untracked } else { Tracking::Tracked };
         let scene = BuiltinScene {
             gaussians: self.gaussians,

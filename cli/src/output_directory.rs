@@ -156,6 +156,20 @@ fn clear_killed(directory: &Path) {
     }
 }
 
+/// Refuses a directory in which there is something of these `names`, that a command chooses itself, but nothing of `marks`, which
+/// every run of it leaves before: it is of somebody else, and nobody has said that it may be replaced.
+pub(crate) fn refuse_others(directory: &Path, names: &[&str], marks: &[&str]) -> Result<(), Failure> {
+    let is_own = marks.iter().any(|mark| directory.join(mark).exists());
+    let others = names.iter().map(|name| directory.join(name)).find(|path| path.exists());
+    match others.filter(|_| !is_own) {
+        None => Ok(()),
+        Some(path) => Err(Failure::Usage(format!(
+            "{}: this command writes there, and no earlier run of it has; give another directory",
+            path.display()
+        ))),
+    }
+}
+
 /// The files directly in a directory whose paths are meant; none where there is no such directory.
 pub(crate) fn files_in(directory: &Path, is_meant: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
     let Ok(entries) = std::fs::read_dir(directory) else { return Vec::new() };

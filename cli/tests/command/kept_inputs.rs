@@ -88,6 +88,30 @@ fn what_a_shell_reads_or_writes_is_no_other_file() {
     assert!(piped.status.success(), "{piped:?}");
 }
 
+/// Names that a command chooses are those of many programs: files of others are not replaced.
+#[test]
+fn pages_and_reports_of_others_stay() {
+    let directory = directory();
+    write_still(directory.path());
+    let chart = "splatstream chart still.ply -o . --quick --qualities low --cameras ring:1 --height 20";
+    let demo = "splatstream demo -o . --gaussians 100 --frames 1";
+    for (name, line) in [("index.html", chart), ("report.json", demo), ("demo.html", demo)] {
+        let file = directory.path().join(name);
+        fs::write(&file, "of somebody else").unwrap();
+        let refused = shell(directory.path(), line);
+        assert_eq!(refused.status.code(), Some(2), "{line}: {refused:?}");
+        assert!(String::from_utf8_lossy(&refused.stderr).contains("no earlier run of it has"), "{refused:?}");
+        assert_eq!(fs::read_to_string(&file).unwrap(), "of somebody else");
+        fs::remove_file(file).unwrap();
+        assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1, "{line}");
+    }
+    // Their own they replace.
+    for line in [chart, demo, chart, demo] {
+        let done = shell(directory.path(), line);
+        assert!(done.status.success(), "{line}: {done:?}");
+    }
+}
+
 #[test]
 fn a_stream_of_each_replaces_no_scene_that_comes_later() {
     let directory = directory();

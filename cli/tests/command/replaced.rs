@@ -26,7 +26,7 @@ const REPLACING: [(&str, &str); 19] = [
     ("play package --no-wait -o out.json", "out.json"),
     ("train --builtin 1 --frames 2 --quality low -o out.bin", "out.bin"),
     ("fit capture -o out.ply --iterations 1 --gaussians 100 --hold-out 0", "out.ply"),
-    ("chart still.ply -o out --quick --qualities low --cameras ring:1 --height 20", "out/index.html"),
+    ("chart still.ply -o out --quick --qualities low --cameras ring:1 --height 20", "out/points.csv"),
     ("demo -o out --gaussians 100 --frames 2", "out/demo.gss"),
     ("manual -o out", "out/splatstream.1"),
     ("conformance run --suite SUITE --report out.json --filter codebook-two-*", "out.json"),
