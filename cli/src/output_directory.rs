@@ -42,6 +42,7 @@ impl OutputDirectory {
                  give another directory, or --force to replace them"
             )));
         }
+        earlier.iter().try_for_each(|file| refuse_other_disk(file, path))?;
         if force {
             clear_killed(path);
         }
@@ -77,6 +78,9 @@ impl OutputDirectory {
 
     /// A file with a name in the directory, or below it.
     pub(crate) fn create(&mut self, name: impl AsRef<Path>) -> Result<OutputFile, Failure> {
+        if self.replaces() {
+            refuse_other_disk(&self.path_of(&name), &self.path)?;
+        }
         if self.replaces() && self.staging.is_none() {
             let staging = Staging::create(&self.path);
             self.staging = Some(staging.map_err(|error| Failure::file("write to", &self.path, &error))?);
@@ -112,6 +116,29 @@ impl OutputDirectory {
         }
         Ok(())
     }
+}
+
+/// Refuses a file in a directory below another that is on another disk, as a link may lead there: it could not be moved, which would
+/// be known only when all files are made.
+#[cfg(unix)]
+fn refuse_other_disk(file: &Path, directory: &Path) -> Result<(), Failure> {
+    use std::os::unix::fs::MetadataExt;
+    let disk_of = |path: &Path| path.metadata().map(|found| found.dev());
+    let below = file.parent().unwrap_or(directory);
+    match (disk_of(below), disk_of(directory)) {
+        (Ok(disk), Ok(other)) if disk != other => Err(Failure::other(format!(
+            "{}: it is on another disk than {}, and files of an earlier run are replaced by moving new ones there\n  \
+             give another directory, or put both on one disk",
+            below.display(),
+            directory.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(not(unix))]
+fn refuse_other_disk(_: &Path, _: &Path) -> Result<(), Failure> {
+    Ok(())
 }
 
 /// Removes the directories below one that a file was in, if they are empty. One with other files stays, and so do those above it.

@@ -296,6 +296,30 @@ fn what_a_killed_run_has_left_is_cleared() {
     });
 }
 
+/// Files cannot be moved to another disk, which is said at once; nothing is lost.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_part_of_a_directory_on_another_disk_is_refused() {
+    use std::os::unix::fs::MetadataExt;
+    let line = "simulate -o out --views 2 --height 18 --samples 1 --points 50";
+    with_earlier(&[(line, "out/transforms.json")], |directory, line, file| {
+        let disk_of = |path: &Path| path.metadata().unwrap().dev();
+        // The memory of the machine, unless that is where the test writes.
+        let other = ["/dev/shm", "/var/tmp"].into_iter().map(Path::new);
+        let mut other = other.filter(|path| path.is_dir() && disk_of(path) != disk_of(directory));
+        let Some(other) = other.next() else { return };
+        let other = tempfile::tempdir_in(other).unwrap();
+        fs::write(other.path().join("view_000.png"), OLD).unwrap();
+        std::os::unix::fs::symlink(other.path(), directory.join("out/images")).unwrap();
+        let refused = run_in(directory, &format!("{line} --force"), false);
+        assert_eq!(refused.status.code(), Some(1), "{refused:?}");
+        assert!(String::from_utf8_lossy(&refused.stderr).contains("on another disk"), "{refused:?}");
+        assert_eq!(fs::read_to_string(other.path().join("view_000.png")).unwrap(), OLD);
+        assert_eq!(fs::read_to_string(file).unwrap(), OLD);
+        fs::remove_file(directory.join("out/images")).unwrap();
+    });
+}
+
 /// Two runs do not mix their files in one directory.
 #[cfg(unix)]
 #[test]
