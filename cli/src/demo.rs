@@ -73,8 +73,15 @@ impl Demo {
     /// Makes, encodes, decodes, verifies, reports.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "files of the demo")?;
-        // What comes after the stream; a run that was ended before has left only frames of the source.
-        let later = [PAGE, "report.json", "report.txt", "decoded/frame_0000.ply", "pictures/source.png"];
+        // The stream is the first file that is written.
+        let later = [
+            PAGE,
+            "report.json",
+            "report.txt",
+            "source/frame_0000.ply",
+            "decoded/frame_0000.ply",
+            "pictures/source.png",
+        ];
         refuse_others(&self.out, &later, &[STREAM])?;
         let tracking = if self.untracked { Tracking::Untracked } else { Tracking::Tracked };
         let scene = BuiltinScene {
@@ -85,8 +92,9 @@ impl Demo {
         };
         let settings = self.settings(scene.sh_degree)?;
         make_directory(&self.out)?;
-        let mut source = self.write_source(scene)?;
-        let (stream, encoding, digests) = self.encode(&mut source.frames, &settings)?;
+        let mut frames: Vec<GaussianFrame> = (0..scene.frames).map(|number| scene.frame(number)).collect();
+        let (stream, encoding, digests) = self.encode(&mut frames, &settings)?;
+        let source = self.write_source(&scene, frames)?;
         let mut everything = Everything::start(self.out.join("decoded"), source.frames.first())?;
         let points = self.points(&stream, &source.frames, &mut everything)?;
         let errors = everything.verified(&digests)?;
@@ -122,11 +130,10 @@ impl Demo {
         Ok(Settings { max_memory: bound.left(), ..settings })
     }
 
-    /// Makes the frames and writes them as PLY.
-    fn write_source(&self, scene: BuiltinScene) -> Result<Source, Failure> {
+    /// Writes the frames as PLY.
+    fn write_source(&self, scene: &BuiltinScene, frames: Vec<GaussianFrame>) -> Result<Source, Failure> {
         let directory = self.out.join("source");
         make_directory(&directory)?;
-        let frames: Vec<GaussianFrame> = (0..scene.frames).map(|number| scene.frame(number)).collect();
         let mut ply_bytes = 0;
         for (number, frame) in frames.iter().enumerate() {
             let bytes = ply::write(frame);

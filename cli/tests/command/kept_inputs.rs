@@ -95,14 +95,16 @@ fn pages_and_reports_of_others_stay() {
     write_still(directory.path());
     let chart = "splatstream chart still.ply -o . --quick --qualities low --cameras ring:1 --height 20";
     let demo = "splatstream demo -o . --gaussians 100 --frames 1";
-    for (name, line) in [("index.html", chart), ("report.json", demo), ("demo.html", demo)] {
+    for (name, line) in [("index.html", chart), ("report.json", demo), ("source/frame_0000.ply", demo)] {
         let file = directory.path().join(name);
+        fs::create_dir_all(file.parent().unwrap()).unwrap();
         fs::write(&file, "of somebody else").unwrap();
         let refused = shell(directory.path(), line);
         assert_eq!(refused.status.code(), Some(2), "{line}: {refused:?}");
         assert!(String::from_utf8_lossy(&refused.stderr).contains("no earlier run of it has"), "{refused:?}");
         assert_eq!(fs::read_to_string(&file).unwrap(), "of somebody else");
         fs::remove_file(file).unwrap();
+        let _none = fs::remove_dir(directory.path().join("source"));
         assert_eq!(fs::read_dir(directory.path()).unwrap().count(), 1, "{line}");
     }
     // Their own they replace.
