@@ -77,19 +77,23 @@ impl<'a> PlanesRef<'a> {
 
     /// Every plane with its PLY name, in PLY's usual order apart from `f_rest_*`, which come in plane order.
     pub(crate) fn named(self, sh_degree: u8) -> impl Iterator<Item = (String, &'a Vec<f32>)> {
-        let numbered = |prefix: &'static str| {
-            move |(at, plane)| (format!("{prefix}{at}"), plane) as (String, &'a Vec<f32>)
-        };
-        let rest = move |(plane, values)| (format!("f_rest_{}", rest_index(plane, sh_degree)), values);
-        ["x", "y", "z"]
-            .into_iter()
-            .map(str::to_owned)
-            .zip(self.position)
-            .chain(self.dc.iter().enumerate().map(numbered("f_dc_")))
-            .chain(self.sh.iter().enumerate().map(rest))
-            .chain(std::iter::once(("opacity".to_owned(), self.opacity_logit)))
-            .chain(self.log_scale.iter().enumerate().map(numbered("scale_")))
-            .chain(self.rotation.iter().enumerate().map(numbered("rot_")))
+        let planes: Vec<&Vec<f32>> = self.iter().collect();
+        let order = (0..3).chain(11..planes.len()).chain([10]).chain(3..10);
+        order.filter_map(move |at| Some((property(at, sh_degree), *planes.get(at)?)))
+    }
+}
+
+/// The PLY names of all planes but those of bands 1 and up, in the order of the fields of [`Planes`].
+const NAMES: [&str; 14] = [
+    "x", "y", "z", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3", "opacity", "f_dc_0",
+    "f_dc_1", "f_dc_2",
+];
+
+/// The PLY name of a plane by its place among all.
+fn property(plane: usize, sh_degree: u8) -> String {
+    match NAMES.get(plane) {
+        Some(&name) => name.to_owned(),
+        None => format!("f_rest_{}", rest_index(plane.saturating_sub(NAMES.len()), sh_degree)),
     }
 }
 
@@ -236,9 +240,8 @@ impl GaussianFrame {
             return Err(FrameError::ShPlanes { degree: sh_degree, expected, found });
         }
         let rows = planes.position[0].len();
-        if let Some((property, plane)) =
-            PlanesRef::from(&planes).named(sh_degree).find(|(_, plane)| plane.len() != rows)
-        {
+        if let Some((at, plane)) = planes.iter().enumerate().find(|(_, plane)| plane.len() != rows) {
+            let property = property(at, sh_degree);
             return Err(FrameError::Length { property, expected: rows, found: plane.len() });
         }
         Ok(Self::made_of(planes, sh_degree, false))
