@@ -1,4 +1,4 @@
-//! Frames to a stream: `cargo run --example encode [OUT.gss]`. Without a name it makes examples/talk.gss again.
+//! Frames to a stream: `cargo run --example encode OUT.gss`. An earlier version of the encoder made examples/talk.gss so.
 #![expect(clippy::print_stdout, reason = "an example shows what it has")]
 
 use splatstream::settings::Structure;
@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::BufWriter;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let path = std::env::args().nth(1).unwrap_or_else(|| "examples/talk.gss".to_owned());
+    let path = std::env::args().nth(1).ok_or("give the name of the stream to write")?;
     let scene = BuiltinScene { gaussians: 400, frames: 12, sh_degree: 0, ..BuiltinScene::default() };
     let settings = Settings {
         gop: 4,
