@@ -6,6 +6,8 @@ import importlib.util
 import io
 import json
 import os
+import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -182,6 +184,51 @@ class Fluster(unittest.TestCase):
                 for made in make.suites("1", cases, "file:///x.zip", "0"):
                     for vector in made["test_vectors"]:
                         self.assertIn(vector["input_file"], archive.namelist())
+
+
+class Folder(unittest.TestCase):
+    """What people unpack, beside nothing else of the repository."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.around = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.around.cleanup)
+        cls.folder = os.path.join(cls.around.name, "kit")
+        archive = os.path.join(cls.around.name, "streams.zip")
+        # Which program the kit has does not matter here: releases try it.
+        words = [os.path.join(HERE, "assemble.sh"), cls.folder, os.path.join(HERE, "submit.py"), archive, "https://example.com/x.zip"]
+        subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
+
+    def test_all_links_lead_somewhere(self):
+        lost, count = [], 0
+        for folder, _, files in os.walk(self.folder):
+            for name in files:
+                if not name.endswith(".md"):
+                    continue
+                with open(os.path.join(folder, name), encoding="utf-8") as f:
+                    targets = re.findall(r"\]\(([^)\s#]+)", f.read())
+                for target in (target for target in targets if "://" not in target):
+                    count += 1
+                    if not os.path.exists(os.path.join(folder, target)):
+                        lost.append((os.path.relpath(os.path.join(folder, name), self.folder), target))
+        self.assertEqual(lost, [])
+        self.assertGreater(count, 20)
+
+    def test_files_of_the_table_are_those_that_are_there(self):
+        with open(os.path.join(self.folder, "README.md"), encoding="utf-8") as f:
+            rows = [line.split("|")[1] for line in f if line.startswith("| `")]
+        named = {name.rstrip("/") for row in rows for name in re.findall("`([^`]+)`", row)}
+        self.assertEqual(named | {"README.md"}, set(os.listdir(self.folder)))
+
+    def test_the_independent_decoder_runs_as_it_is_written(self):
+        with open(os.path.join(self.folder, "README.md"), encoding="utf-8") as f:
+            [line] = [line for line in f if line.startswith("    python3 runner") and "adapter.py" in line]
+        protocols = (shlex.split(line, comments=True)[2:4], ["--decoder", "adapters/shell/adapter.sh {in} {op} {mode} {out}"])
+        for protocol in protocols:
+            words = [sys.executable, "runner", *protocol, "--strict", "--time", "60", "--filter", "codebook-two-*"]
+            ended = subprocess.run(words, cwd=self.folder, stdout=subprocess.PIPE, text=True, check=False)
+            self.assertEqual(ended.returncode, 0, ended.stdout)
+            self.assertIn(" 0 failed, 0 not claimed", ended.stdout)
 
 
 if __name__ == "__main__":

@@ -9,12 +9,20 @@ from .errors import require
 from .semantics import in_range, one_of
 from .syntax import Record
 
-DATA = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..", "spec", "data")
-
 # SS-WT-001: SHA-256 in hexadecimal and file in spec/data of each registered network
 REGISTERED = (
     ("eb23e765a05bf3f974b059aee3d3c371871c855c69c55dd2b934fc706e5c0b79", "default-network.bin"),
 )
+
+
+def data_folder():
+    """spec/data. The text lies beside this folder in the conformance kit, and beside the one above in the repository."""
+    above = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    kit, repository = (os.path.join(folder, "spec", "data") for folder in (above, os.path.dirname(above)))
+    return kit if os.path.isdir(kit) else repository
+
+
+DATA = data_folder()
 
 
 def registered_networks():
