@@ -39,3 +39,22 @@ fn every_command_has_a_manual_page() {
         assert!(said.contains("manual pages are written to a directory"), "{said}");
     }
 }
+
+/// The README of the crate names all commands, and no other.
+#[test]
+fn the_readme_names_every_command() {
+    let directory = directory();
+    let pages = json(&["manual", "-o", text(directory.path())]);
+    let commands = pages["pages"].as_array().unwrap().iter().filter_map(|page| {
+        let name = page.as_str()?.strip_prefix("splatstream-")?.strip_suffix(".1")?;
+        (!name.contains('-')).then_some(name)
+    });
+    let mut commands: Vec<&str> = commands.collect();
+    commands.sort_unstable();
+    let readme = include_str!("../../README.md");
+    let run = readme.lines().filter_map(|line| line.strip_prefix("    splatstream ")?.split(' ').next());
+    let others = readme.split("\nAlso: ").nth(1).unwrap().split(". ").next().unwrap();
+    let mut named: Vec<&str> = run.chain(others.split('`').skip(1).step_by(2)).collect();
+    named.sort_unstable();
+    assert_eq!(named, commands);
+}
