@@ -3,7 +3,7 @@
     python3 conformance/peers/formats.py SCENE... --splatstream BINARY [--cache FOLDER]
 
 Each scene (PLY, .splat, .spz ...) is encoded, and decoded once to PLY: that is the reference of all that follows, so that
-nothing is measured but the formats. Prints a table of the PSNR of pictures (compare --cameras ring:4) and bytes, and fails
+nothing is measured but the formats. Prints a table of the PSNR of pictures (compare --cameras ring:12) and bytes, and fails
 where a tool does not read a file, counts differ, or a file of ours is worse by more than 0.1 dB than theirs.
 Packages are installed into the cache, as by run.py.
 """
@@ -22,7 +22,8 @@ KSPLAT = Package("npm", "@mkkellogg/gaussian-splats-3d", "0.4.7")
 VALIDATOR = Package("npm", "gltf-validator", "2.0.0-dev.3.10")
 SPLATS4D = Package("pip", "splats4d", "0.1.0")
 
-# Theirs is as good as ours within this, decibels.
+# Theirs is as good as ours within this, decibels, in twelve views: in four, two files with equal errors of all values were
+# 0.14 dB apart.
 TOLERANCE = 0.1
 # What floats lose on the way through another program.
 EXACT = 80
@@ -44,7 +45,7 @@ class Checks:
 
     def psnr(self, path, reference):
         """Of pictures of a file beside the reference; every Gaussian must be there."""
-        out = json.loads(self.ours("compare", path, reference, "--cameras", "ring:4", "--height", "360", "--json"))
+        out = json.loads(self.ours("compare", path, reference, "--cameras", "ring:12", "--height", "360", "--json"))
         assert out["gaussians_a"] == out["gaussians_b"], "%s has %d Gaussians, %d are wanted" % (
             path, out["gaussians_a"], out["gaussians_b"])
         return math.inf if out["psnr_db"] is None else out["psnr_db"]
@@ -108,7 +109,7 @@ class Checks:
                  self.psnr_of_first(coded, frame), os.path.getsize(coded), EXACT - 20)
 
     def psnr_of_first(self, sequence, frame):
-        out = json.loads(self.ours("compare", sequence, frame, "--cameras", "ring:4", "--height", "360", "--json"))
+        out = json.loads(self.ours("compare", sequence, frame, "--cameras", "ring:12", "--height", "360", "--json"))
         return math.inf if out["psnr_db"] is None else out["psnr_db"]
 
 
