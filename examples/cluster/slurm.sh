@@ -16,13 +16,15 @@ set -euo pipefail
 SCRATCH=${SCRATCH:-$OUT.shards}
 export FRAMES OUT SHARDS SCRATCH
 options=("$@")
+# Jobs that wait for one that has failed would wait for ever.
+after=(--kill-on-invalid-dep=yes --export=ALL)
 
 case ${STEP:-submit} in
 submit)
     mkdir -p "$SCRATCH"
     plan=$(STEP=plan sbatch --parsable --export=ALL "$0" "${options[@]}")
-    array=$(STEP=shard sbatch --parsable --export=ALL --dependency="afterok:$plan" --array="1-$SHARDS" "$0" "${options[@]}")
-    join=$(STEP=join sbatch --parsable --export=ALL --dependency="afterok:$array" --cpus-per-task=1 "$0")
+    array=$(STEP=shard sbatch --parsable "${after[@]}" --dependency="afterok:$plan" --array="1-$SHARDS" "$0" "${options[@]}")
+    join=$(STEP=join sbatch --parsable "${after[@]}" --dependency="afterok:$array" --cpus-per-task=1 "$0")
     echo "plan $plan, shards $array, $OUT after $join"
     ;;
 plan)

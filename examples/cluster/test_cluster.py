@@ -23,6 +23,7 @@ class Files(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             folder = pathlib.Path(folder)
             sbatch = """#!/bin/bash
+                echo "$*" >>"$LOG.jobs"
                 while [[ $1 == --* ]]; do case $1 in --array=1-*) count=${1#--array=1-};; esac; shift; done
                 export SLURM_CPUS_PER_TASK=2
                 for number in $(seq 1 "${count:-1}"); do SLURM_ARRAY_TASK_ID=$number bash "$@" >&2; done
@@ -45,7 +46,10 @@ class Files(unittest.TestCase):
                 return log.read_text().splitlines()
 
             asked, again = run(), run()
+            waiting = [job for job in (folder / "log.jobs").read_text().splitlines() if "--dependency" in job]
         self.assertEqual(len(asked), 5)
+        self.assertEqual(len(waiting), 4)
+        self.assertTrue(all("--kill-on-invalid-dep=yes" in job for job in waiting), waiting)
         self.assertIn("--write-plan", asked[0])
         for number, shard in enumerate(asked[1:4], 1):
             self.assertIn(f"--shard {number}/3", shard)
