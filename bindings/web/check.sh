@@ -79,6 +79,6 @@ fi
 types
 ENGINES=$tools plain
 if browser; then
-    node --test --test-concurrency=1 tests/browser.test.mjs tests/packages.test.mjs tests/engines.test.mjs
+    node --test --test-concurrency=1 tests/browser.test.mjs tests/packages.test.mjs tests/engines.test.mjs tests/readme.test.mjs
     node tests/first.mjs "$WEB_TESTS/long/demo.gss" "$WEB_TESTS/package"
 fi
