@@ -53,6 +53,21 @@ sizes() {
     at_most 'a page of the moving scene' 1000000 "$WEB_TESTS/demo/demo.html"
 }
 
+# What npm publishes has the text of the licences.
+licences() {
+    local package
+    if ! command -v npm >/dev/null; then
+        echo "skipped: what npm publishes, for which npm is not there"
+        return
+    fi
+    for package in decoder player; do
+        (cd "$package" && npm pack --silent --dry-run --json) |
+            node -e 'const [{ files }] = JSON.parse(require("fs").readFileSync(0));
+                process.exitCode = files.filter(({ path }) => path.startsWith("LICENSE-")).length === 2 ? 0 : 1' ||
+            { echo "$package: npm would publish it without LICENSE-APACHE and LICENSE-MIT" >&2; exit 1; }
+    done
+}
+
 # Programs that use the packages as npm installs them compile.
 types() {
     local installed=$tools/node_modules/@splatstream programs=$tools/programs
@@ -71,6 +86,7 @@ fi
 vectors
 node --test tests/node.test.mjs tests/package.test.mjs
 sizes
+licences
 node tests/speed.mjs "$WEB_TESTS/scene/demo.gss"
 if ! packages typescript@5.9.3 wabt@1.0.39 three@0.187.0 @types/three@0.187.0 @sparkjsdev/spark@2.2.0 playcanvas@2.23.3; then
     echo "skipped: types, engines without vectors and the browser, for which npm cannot install TypeScript, WABT, Spark and PlayCanvas"
