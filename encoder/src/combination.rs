@@ -11,10 +11,8 @@ use rayon::prelude::*;
 pub(crate) const TILE: usize = 1 << 8;
 /// Sums that are taken at the same time.
 const LANES: usize = 1 << 5;
-/// Gaussians that a thread takes at once, whole tiles, and how often that is done before planes are put together: as much is
-/// in memory twice.
+/// Gaussians that a thread takes at once: whole tiles.
 const PART: usize = 1 << 12;
-const PARTS: usize = 1 << 6;
 
 /// The values that some Gaussians have in a plane; those of a last tile may be fewer, and what stands behind them is no matter.
 pub(crate) type Tile = [f32; TILE];
@@ -84,29 +82,22 @@ pub(crate) fn assembled(
     planes: usize,
     tile: impl Fn(usize, &mut [Tile]) + Sync,
 ) -> Vec<Vec<f32>> {
-    let part = |&start: &usize| -> Vec<Vec<f32>> {
-        let end = count.min(start + PART);
-        let mut of_part = vec![Vec::with_capacity(end - start); planes];
+    let mut whole: Vec<Vec<f32>> = (0..planes).map(|_| vec![0.0; count]).collect();
+    // Each part of the Gaussians has a part of every plane.
+    let mut chunks: Vec<_> = whole.iter_mut().map(|plane| plane.chunks_mut(PART)).collect();
+    let part = |_| -> Vec<&mut [f32]> { chunks.iter_mut().filter_map(Iterator::next).collect() };
+    let parts: Vec<Vec<&mut [f32]>> = (0..count.div_ceil(PART)).map(part).collect();
+    parts.into_par_iter().enumerate().for_each(|(number, part)| {
         let mut tiles = vec![[0.0; TILE]; planes];
-        for first in (start..end).step_by(TILE) {
+        let mut places: Vec<_> = part.into_iter().map(|plane| plane.chunks_mut(TILE)).collect();
+        for first in (number * PART..count.min((number + 1) * PART)).step_by(TILE) {
             tile(first, &mut tiles);
-            let each = of_part.iter_mut().zip(&tiles);
-            each.for_each(|(plane, tile)| plane.extend(tile.iter().take(end - first)));
+            for (places, tile) in places.iter_mut().zip(&tiles) {
+                let values = places.next().into_iter().flatten();
+                values.zip(tile).for_each(|(value, &of_tile)| *value = of_tile);
+            }
         }
-        of_part
-    };
-    let mut whole: Vec<Vec<f32>> = (0..planes).map(|_| Vec::with_capacity(count)).collect();
-    let starts: Vec<usize> = (0..count).step_by(PART).collect();
-    for some in starts.chunks(PARTS) {
-        let parts: Vec<Vec<Vec<f32>>> = some.par_iter().map(part).collect();
-        let each = whole.par_iter_mut().enumerate();
-        each.for_each(|(index, plane)| {
-            parts
-                .iter()
-                .filter_map(|part| part.get(index))
-                .for_each(|values| plane.extend_from_slice(values));
-        });
-    }
+    });
     whole
 }
 

@@ -332,10 +332,11 @@ fn ranked(scores: &[f64], frame: &GaussianFrame, gaussians: &[u32]) -> Vec<u32> 
     let falling = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
     rows.par_sort_unstable_by(falling);
     // Volumes take long to calculate, and most Gaussians need none.
-    for tied in rows.chunk_by_mut(|a, b| a.0.total_cmp(&b.0).is_eq()).filter(|tied| tied.len() > 1) {
-        tied.par_iter_mut().for_each(|(score, row)| *score = volume(*row));
+    let ties = rows.par_chunk_by_mut(|a, b| a.0.total_cmp(&b.0).is_eq());
+    ties.filter(|tied| tied.len() > 1).for_each(|tied| {
+        tied.par_iter_mut().with_min_len(AT_ONCE).for_each(|(score, row)| *score = volume(*row));
         tied.par_sort_unstable_by(falling);
-    }
+    });
     rows.into_iter().map(|(_, gaussian)| gaussian).collect()
 }
 
