@@ -102,12 +102,13 @@ test('the order is that of the depth, farthest first', async () => {
 
 test('memory does not grow from round to round', async () => {
   const decoder = await opened();
-  const rounds = Array.from({ length: 6 }, () => {
+  const rounds = Array.from({ length: 24 }, () => {
     decoder.seek(0);
     assert.equal(digests(decoder, () => decoder.show()).length, FRAMES);
     return decoder.memory;
   });
-  assert.equal(rounds[5], rounds[2]);
+  // The allocator finds places for what lives side by side in the first rounds.
+  assert.deepEqual(new Set(rounds.slice(8)), new Set([rounds[7]]));
 });
 
 test('the description says what the stream holds', async () => {

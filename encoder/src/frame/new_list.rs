@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use splatstream_decoder::increment::values::SectionValues;
 use splatstream_decoder::layout::Section;
 use splatstream_format::entropy::in_force::ModelsInForce;
-use std::collections::BTreeMap;
 
 /// The new Gaussians of a list.
 pub(crate) struct NewList {
@@ -38,20 +37,24 @@ impl NewList {
         let placed: Vec<(Vec<u32>, SectionValues, Grain)> = added.into_par_iter().map(place).collect();
         let layout = coder.layout(Section::New);
         // Lists with equal steps have one bias, so that a unit may use the models of the one before.
-        let mut biases_of_steps = BTreeMap::new();
-        for (_, _, Grain { attribute_step, .. }) in &placed {
-            biases_of_steps.entry(*attribute_step).or_insert_with(|| {
-                let alike = placed.iter().filter(|(_, _, other)| other.attribute_step == *attribute_step);
+        let mut biases_of_lists: Vec<Vec<i32>> = Vec::new();
+        for (at, (_, _, grain)) in placed.iter().enumerate() {
+            let is_alike = |(_, _, other): &(Vec<u32>, SectionValues, Grain)| {
+                other.attribute_step == grain.attribute_step
+            };
+            let before = placed.iter().take(at).position(is_alike);
+            let known = before.and_then(|before| biases_of_lists.get(before)).cloned();
+            biases_of_lists.push(known.unwrap_or_else(|| {
+                let alike = placed.iter().filter(|list| is_alike(list));
                 let alike: Vec<&SectionValues> = alike.map(|(_, values, _)| values).collect();
                 biases(Section::New, &layout, &alike, models, &coder.plan)
-            });
+            }));
         }
-        let draft = |(_, values, grain): &(Vec<u32>, SectionValues, Grain)| {
-            let biases = biases_of_steps.get(&grain.attribute_step).cloned().unwrap_or_default();
+        let draft = |((_, values, grain), biases): (&(Vec<u32>, SectionValues, Grain), Vec<i32>)| {
             let steps = coder.steps(grain.attribute_step);
             SectionDraft::new(layout.clone(), values, biases, steps, &coder.plan)
         };
-        let drafts: Vec<SectionDraft> = placed.par_iter().map(draft).collect();
+        let drafts: Vec<SectionDraft> = placed.par_iter().zip(biases_of_lists).map(draft).collect();
         let lists = placed.into_iter().zip(drafts);
         lists.map(|((added, values, _), coded)| Self { added, values, coded }).collect()
     }
