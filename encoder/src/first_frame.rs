@@ -42,7 +42,11 @@ pub(crate) fn first_frame(source: &mut dyn FrameSource, settings: &Settings) -> 
     Ok(coded_form(read_first(source)?, settings))
 }
 
-fn read_first(source: &mut dyn FrameSource) -> Result<GaussianFrame, Error> {
+/// The first frame as its source has it.
+///
+/// # Errors
+/// A frame that cannot be read.
+pub(crate) fn read_first(source: &mut dyn FrameSource) -> Result<GaussianFrame, Error> {
     source.frame(0).map_err(|source| Error::Source { frame: 0, source })
 }
 

@@ -7,7 +7,7 @@
 
 use crate::allocation::{Fit, finer};
 use crate::error::Error;
-use crate::first_frame::coded_form;
+use crate::first_frame::{coded_form, first_frame, read_first};
 use crate::importance::Ranking;
 use crate::pass::{encode_once, encode_smaller};
 use crate::progress::Progress;
@@ -22,7 +22,6 @@ use crate::strips::StripViews;
 use crate::verification::{Tried, Views};
 use crate::window::FirstFrames;
 use splatstream_format::syntax::FrameType;
-use splatstream_gaussians::GaussianFrame;
 use std::io::Write;
 
 /// A PSNR is near enough within so many decibels of what is this much higher than the one that is asked for: a little too
@@ -144,7 +143,7 @@ struct Fitting<'a> {
 
 impl<'a> Fitting<'a> {
     fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
-        let frame = first(source)?;
+        let frame = read_first(source)?;
         let Views { of_fit, unseen } = Views::of(&frame, settings);
         let frame = coded_form(frame, settings);
         // What is left out of the source is in its pictures.
@@ -196,7 +195,7 @@ impl<'a> Fitting<'a> {
         let steps = match nearest.filter(|known| apart(known) <= ALIKE) {
             Some((from, steps, _)) => self.fit.no_finer(finer(*steps, decibels - from)),
             None => {
-                let again = || Ok(coded_form(first(source)?, self.settings));
+                let again = || first_frame(source, self.settings);
                 let (steps, psnr) = self.fit.at(decibels as f32, again)?;
                 self.known.push((decibels, steps, psnr));
                 steps
@@ -231,11 +230,6 @@ impl<'a> Fitting<'a> {
             }
         }
     }
-}
-
-/// The first frame of a source.
-fn first(source: &mut dyn FrameSource) -> Result<GaussianFrame, Error> {
-    source.frame(0).map_err(|source| Error::Source { frame: 0, source })
 }
 
 /// Looks for the PSNR to fit for.
