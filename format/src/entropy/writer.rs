@@ -13,14 +13,16 @@ use crate::{Error, ErrorKind, Result};
 const CONTEXTS: usize = 1 << 8;
 /// Tokens of a table.
 const TOKENS: usize = 1 << 8;
+/// A place of a table at which there is none: a plane has at most 64 contexts, and no more tables.
+const NO_TABLE: u8 = u8::MAX;
 
 /// A plane model arranged for coding. Built once a unit, shared by its blocks.
 #[derive(Debug, Clone)]
 pub struct PlaneEncoder {
     direct_log2: u8,
-    /// The symbol of each token, table by table; those of frequency 0 cannot be coded. The last table has no others.
+    /// The symbol of each token, table by table; those of frequency 0 cannot be coded.
     symbols: Vec<[Symbol; TOKENS]>,
-    /// The table of each context.
+    /// The table of each context, [`NO_TABLE`] of those that the model does not have.
     table_of_context: [u8; CONTEXTS],
 }
 
@@ -43,9 +45,8 @@ impl PlaneEncoder {
             }
             symbols
         };
-        let nothing: &[u16] = &[];
-        let of_tables = model.tables.iter().map(Frequencies::of_token).chain([nothing]);
-        let mut table_of_context = [u8::try_from(model.tables.len()).unwrap_or(u8::MAX); CONTEXTS];
+        let of_tables = model.tables.iter().map(Frequencies::of_token);
+        let mut table_of_context = [NO_TABLE; CONTEXTS];
         table_of_context.iter_mut().zip(&model.table_of_context).for_each(|(to, &table)| *to = table);
         Self { direct_log2: model.direct_log2, symbols: of_tables.map(expanded).collect(), table_of_context }
     }
@@ -53,7 +54,7 @@ impl PlaneEncoder {
     /// The slots of a token in a context; none of them if it cannot be coded there.
     #[inline(always)]
     fn symbol(&self, context: u8, token: u8) -> Symbol {
-        let table = self.table_of_context.get(usize::from(context)).copied().unwrap_or(u8::MAX);
+        let table = self.table_of_context.get(usize::from(context)).copied().unwrap_or(NO_TABLE);
         let symbols = self.symbols.get(usize::from(table));
         symbols.and_then(|symbols| symbols.get(usize::from(token))).copied().unwrap_or_default()
     }
