@@ -89,26 +89,26 @@ pub(crate) struct ShPlan {
 /// A bit is worth [`BIT`].
 pub(crate) fn plan_sh(
     components: &[Vec<f32>],
-    exponents: &[u8],
+    exponent: impl Fn(usize) -> u8,
     gaussians_of_gop: usize,
     choice: ShChoice,
     preset: Preset,
 ) -> ShPlan {
-    let count = exponents.len();
+    let count = components.first().map_or(0, Vec::len);
     let coefficients = ShPlan { codebooks: Vec::new(), trial: None };
     let try_it = choice == ShChoice::VectorQuantised || choice == ShChoice::Auto && preset != Preset::Fast;
     if !try_it || count < 2 {
         return coefficients;
     }
     let rank = components.len();
-    let rows = sampled_rows(components, exponents, (count / (2 * TRIAL)).max(1));
+    let rows = sampled_rows(components, &exponent, (count / (2 * TRIAL)).max(1));
     let entries = vq::entry_count(gaussians_of_gop, choice == ShChoice::VectorQuantised);
     let (trial, pays) = compare(&rows, rank, gaussians_of_gop, entries);
     let trial = Some(trial);
     if choice == ShChoice::Auto && !pays {
         return ShPlan { trial, ..coefficients };
     }
-    let all = sampled_rows(components, exponents, (count / (vq::TRAINING_PER_ENTRY * entries)).max(1));
+    let all = sampled_rows(components, &exponent, (count / (vq::TRAINING_PER_ENTRY * entries)).max(1));
     ShPlan { codebooks: vec![vq::train(&all, rank, entries.min(count))], trial }
 }
 
@@ -133,31 +133,31 @@ pub(crate) fn compare(
 
 /// The components of every `stride`-th Gaussian in its own steps, one after the other.
 #[expect(clippy::indexing_slicing, reason = "tiles and rows lie within the planes that they are cut from")]
-fn sampled_rows(components: &[Vec<f32>], exponents: &[u8], stride: usize) -> Vec<f32> {
+fn sampled_rows(components: &[Vec<f32>], exponent: impl Fn(usize) -> u8, stride: usize) -> Vec<f32> {
+    let count = components.first().map_or(0, Vec::len);
     let of_row = |row: usize| {
-        let step = step(exponents[row]) as f32;
+        let step = step(exponent(row)) as f32;
         components.iter().map(move |plane| plane[row] / step)
     };
-    (0..exponents.len()).step_by(stride).flat_map(of_row).collect()
+    (0..count).step_by(stride).flat_map(of_row).collect()
 }
 
 /// What principal components save against coefficients as they are, on some of the Gaussians.
 pub(crate) fn worth_of_transform(
     components: &[Vec<f32>],
     planes: &[&[f32]],
-    exponents: &[u8],
+    exponent: impl Fn(usize) -> u8,
     step: f32,
 ) -> Saving {
-    let stride = (exponents.len() / TRIAL).max(1);
+    let stride = (components.first().map_or(0, Vec::len) / TRIAL).max(1);
     let some = |plane: &&[f32]| -> Vec<f32> { plane.iter().step_by(stride).copied().collect() };
     let planes: Vec<Vec<f32>> = planes.iter().map(some).collect();
     let planes: Vec<&[f32]> = planes.iter().map(Vec::as_slice).collect();
     let identity = transform(TransformKind::Sh, &Components::identity(planes.len()), step);
     let plain = self::components(&identity, &planes, step);
-    let exponents_of_some: Vec<u8> = exponents.iter().step_by(stride).copied().collect();
     let [own, other] = [
-        (sampled_rows(components, exponents, stride), components.len()),
-        (sampled_rows(&plain, &exponents_of_some, 1), plain.len()),
+        (sampled_rows(components, &exponent, stride), components.len()),
+        (sampled_rows(&plain, |row| exponent(row * stride), 1), plain.len()),
     ]
     .map(|(rows, rank)| coefficient_cost(&rows, rank));
     Saving::between(Tool::ShTransform, own, other)

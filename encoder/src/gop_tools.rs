@@ -7,9 +7,8 @@ use crate::pca::Components;
 use crate::refinements::parts;
 use crate::report::Report;
 use crate::savings::{Saving, Tool};
-use crate::settings::{Preset, Settings, ShChoice};
+use crate::settings::{Preset, Settings};
 use crate::shape::Shape;
-use rayon::prelude::*;
 use splatstream_decoder::layout::ShCoding;
 use splatstream_decoder::steps::{Stage, StepRule};
 use splatstream_format::payload::{Codebook, Transform};
@@ -68,15 +67,11 @@ impl GopTools {
             if frames == 1 {
                 colour::drop_unused(&mut transform, &mut components, &exponent);
             }
-            // The fast preset compares nothing.
-            let compares = settings.preset != Preset::Fast || settings.sh == ShChoice::VectorQuantised;
-            let compared = if compares { frame.len() } else { 0 };
-            let exponents: Vec<u8> = (0..compared).into_par_iter().map(&exponent).collect();
             if settings.tools.sh_transform && settings.preset != Preset::Fast && !frame.is_empty() {
-                worth_of_transform = Some(colour::worth_of_transform(&components, &planes, &exponents, step));
+                worth_of_transform = Some(colour::worth_of_transform(&components, &planes, &exponent, step));
             }
             let gaussians = frame.len().saturating_mul(frames as usize);
-            let mut plan = colour::plan_sh(&components, &exponents, gaussians, settings.sh, settings.preset);
+            let mut plan = colour::plan_sh(&components, &exponent, gaussians, settings.sh, settings.preset);
             if settings.profile() == Profile::Dynamic {
                 keep_zero(&mut plan.codebooks, usize::from(transform.header.rank));
             }
@@ -147,7 +142,7 @@ fn sh_exponent(
     order: &[u32],
     sequence: &SequenceParameters,
     settings: &Settings,
-) -> impl Fn(usize) -> u8 + Sync {
+) -> impl Fn(usize) -> u8 {
     let mut refinements = vec![0; frame.len()];
     let mut rules = Vec::new();
     for (refinement, part) in (0..).zip(parts(&settings.refinements, order.len())) {
