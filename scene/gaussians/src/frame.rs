@@ -199,8 +199,7 @@ impl Planes {
 
     /// Every plane, in the order of the fields.
     pub fn iter(&self) -> impl Iterator<Item = &Vec<f32>> {
-        let Self { position, log_scale, rotation, opacity_logit, dc, sh } = self;
-        position.iter().chain(log_scale).chain(rotation).chain([opacity_logit]).chain(dc).chain(sh)
+        PlanesRef::from(self).iter()
     }
 
     /// Every plane to change, in the order of the fields.
