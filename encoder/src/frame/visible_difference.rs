@@ -119,7 +119,7 @@ fn turned([w, x, y, z]: [f32; 4], d: [f32; 3]) -> [f32; 3] {
 /// The side of a pixel at the place of a Gaussian, scene units; the mean of the cameras.
 pub(crate) fn pixel(frame: &GaussianFrame, row: usize, cameras: &[Camera]) -> f32 {
     let mut pixel = [0.0];
-    add_pixels(frame.position().each_ref().map(|plane| &plane[row..=row]), cameras, &mut pixel);
+    fill_pixels(frame.position().each_ref().map(|plane| &plane[row..=row]), cameras, &mut pixel);
     pixel[0]
 }
 
@@ -136,12 +136,12 @@ impl WithSimd for Pixels<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        add_pixels(self.position, self.cameras, self.pixels);
+        fill_pixels(self.position, self.cameras, self.pixels);
     }
 }
 
 #[inline(always)]
-fn add_pixels([x, y, z]: [&[f32]; 3], cameras: &[Camera], pixels: &mut [f32]) {
+fn fill_pixels([x, y, z]: [&[f32]; 3], cameras: &[Camera], pixels: &mut [f32]) {
     pixels.fill(0.0);
     for Camera { position: [from_x, from_y, from_z], focal: [focal, _], .. } in cameras {
         let focal = focal.max(f32::MIN_POSITIVE);
