@@ -7,6 +7,7 @@
 
 mod ellipses;
 mod order;
+mod picture;
 mod rows;
 mod trace;
 

@@ -1,8 +1,8 @@
 //! Gaussians to ellipses in a small picture, sixteen at a time.
 #![expect(clippy::indexing_slicing, reason = "lanes and axes are constants")]
 
+use super::SmallView;
 use super::rows::VALUES;
-use crate::camera::Camera;
 use crate::rasterise::{LOW_PASS, Lanes, TILE, seen_slopes};
 
 /// The square of the distance from its centre, in its own widths, to which a Gaussian is blended: beyond are 5 % of it.
@@ -22,39 +22,39 @@ pub(super) struct Ellipse {
     pub(super) yy: f32,
     /// Alpha in the middle.
     pub(super) peak: f32,
-    /// Which of the Gaussians that are left.
-    pub(super) place: u32,
-    /// Red, green and blue without what depends on where it is seen from, at least 0.
-    pub(super) colour: [f32; 3],
+    /// The first and the last line of the picture that it is blended into; neither is below 0.
+    pub(super) lines: [f32; 2],
 }
 
 /// Sixteen Gaussians as a camera sees them.
 pub(super) struct Projected {
-    depth: Lanes,
     centre: [Lanes; 2],
     xx: Lanes,
     skew: Lanes,
     yy: Lanes,
     peak: Lanes,
-    /// How far they are blended along x and y, pixels.
-    extent: [Lanes; 2],
-    /// Red, green and blue.
+    /// The first and the last line.
+    lines: [Lanes; 2],
+    /// Whether each shows.
+    is_seen: [bool; TILE],
+    /// Red, green and blue without what depends on where they are seen from, at least 0.
     colour: [Lanes; 3],
 }
 
 impl Projected {
-    /// `fine`: the side of a pixel of the picture that this one stands for, pixels of this one.
+    /// What is not finite does not show.
     #[inline(always)]
-    pub(super) fn new(values: &[Lanes; VALUES], is_compensated: bool, camera: &Camera, fine: f32) -> Self {
+    pub(super) fn new(values: &[Lanes; VALUES], is_compensated: bool, view: &SmallView) -> Self {
+        let SmallView { camera, fine, near } = view;
         let zero = [0.0; TILE];
         let mut all = Self {
-            depth: zero,
             centre: [zero; 2],
             xx: zero,
             skew: zero,
             yy: zero,
             peak: zero,
-            extent: [zero; 2],
+            lines: [zero; 2],
+            is_seen: [false; TILE],
             colour: [zero; 3],
         };
         let [px, py, pz, ax, ay, az, bx, by, bz, cx, cy, cz, opacity, red, green, blue] = values;
@@ -64,6 +64,7 @@ impl Projected {
         let [(least_x, most_x), (least_y, most_y)] = seen_slopes(camera);
         let (focal, principal) = (camera.focal, camera.principal);
         let fine_pass = LOW_PASS * fine * fine;
+        let [width, height] = [camera.width as f32, camera.height as f32];
         // Written out number by number: the compiler makes vectors of sixteen lanes of straight lines.
         for lane in 0..TILE {
             let offset = [0, 1, 2].map(|axis: usize| position[axis][lane] - from[axis]);
@@ -87,42 +88,58 @@ impl Projected {
             // What it covers in the picture that this one stands for.
             let filtered = sharp + fine_pass * (xx + (yy + fine_pass));
             let covered = if is_compensated { sharp } else { filtered };
-            all.depth[lane] = depth;
-            all.centre[0][lane] = focal[0] * slope[0] + principal[0];
-            all.centre[1][lane] = focal[1] * slope[1] + principal[1];
+            let [x, y] = [0, 1].map(|axis: usize| focal[axis] * slope[axis] + principal[axis]);
+            let (flat, peak) = (1.0 / tall, opacity[lane] * (covered / determinant).sqrt());
+            all.centre[0][lane] = x;
+            all.centre[1][lane] = y;
             all.xx[lane] = tall / determinant;
             all.skew[lane] = -xy / tall;
-            all.yy[lane] = 1.0 / tall;
-            all.peak[lane] = opacity[lane] * (covered / determinant).sqrt();
-            all.extent[0][lane] = (REACH * wide).sqrt();
-            all.extent[1][lane] = (REACH * tall).sqrt();
+            all.yy[lane] = flat;
+            all.peak[lane] = peak;
+            // How far it is blended.
+            let [across, along] = [(REACH * wide).sqrt(), (REACH * tall).sqrt()];
+            let reach = (REACH / flat).sqrt();
+            let (top, bottom) = ((y - reach - 0.5).ceil(), (y + reach - 0.5).floor());
+            let top = if top > 0.0 { top } else { 0.0 };
+            let bottom = if bottom < height - 1.0 { bottom } else { height - 1.0 };
+            all.lines[0][lane] = top;
+            all.lines[1][lane] = bottom;
+            all.is_seen[lane] = (depth >= *near)
+                & (depth < f32::INFINITY)
+                & (peak >= LEAST_ALPHA)
+                & (x + across >= 0.0)
+                & (x - across <= width)
+                & (across < f32::INFINITY)
+                & (y + along >= 0.0)
+                & (y - along <= height)
+                & (along < f32::INFINITY)
+                & (top <= bottom);
         }
         all
     }
 
-    /// Whether a lane shows in the picture. What is not finite does not.
+    /// Whether a lane shows in the picture.
     #[inline(always)]
-    pub(super) fn is_seen(&self, lane: usize, camera: &Camera, near: f32) -> bool {
-        let size = [camera.width, camera.height];
-        let touches = |axis: usize| {
-            let (centre, extent) = (self.centre[axis][lane], self.extent[axis][lane]);
-            centre + extent >= 0.0 && centre - extent <= size[axis] as f32 && extent < f32::INFINITY
-        };
-        let depth = self.depth[lane];
-        depth >= near && depth < f32::INFINITY && self.peak[lane] >= LEAST_ALPHA && touches(0) && touches(1)
+    pub(super) fn is_seen(&self, lane: usize) -> bool {
+        self.is_seen[lane]
+    }
+
+    /// The colour of a lane.
+    #[inline(always)]
+    pub(super) fn colour(&self, lane: usize) -> [f32; 3] {
+        self.colour.each_ref().map(|lanes| lanes[lane])
     }
 
     /// The ellipse of a lane.
     #[inline(always)]
-    pub(super) fn ellipse(&self, lane: usize, place: u32) -> Ellipse {
+    pub(super) fn ellipse(&self, lane: usize) -> Ellipse {
         Ellipse {
             centre: self.centre.each_ref().map(|lanes| lanes[lane]),
             xx: self.xx[lane],
             skew: self.skew[lane],
             yy: self.yy[lane],
             peak: self.peak[lane],
-            place,
-            colour: self.colour.each_ref().map(|lanes| lanes[lane]),
+            lines: self.lines.each_ref().map(|lanes| lanes[lane]),
         }
     }
 }
