@@ -124,18 +124,14 @@ pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters) -> 
     let log_scale = frame.log_scale().each_ref().map(|plane| parts(plane, offset, step));
     let (offset, step) = (sequence.opacity_offset(), sequence.opacity_step());
     let opacity = parts(frame.opacity_logit(), offset, step);
-    let [_, x, y, z] = frame.rotation();
-    let rotation = [x, y, z].map(|plane| {
-        let mut turned = parts(plane, 0.0, sequence.rotation_step());
-        let [a, b, c] = frame.log_scale();
-        for (turned, ((a, b), c)) in turned.iter_mut().zip(a.iter().zip(b).zip(c)) {
-            // A sphere needs no rotation.
-            if a == b && b == c {
-                *turned = 0;
-            }
-        }
-        turned
-    });
+    let ([_, x, y, z], [a, b, c]) = (frame.rotation(), frame.log_scale());
+    let scale = PARTS / sequence.rotation_step();
+    // A sphere needs no rotation.
+    let turned = |(&value, ((a, b), c)): (&f32, ((&f32, &f32), &f32))| {
+        if a == b && b == c { 0 } else { part(value, 0.0, scale) }
+    };
+    let rotation =
+        [x, y, z].map(|plane| plane.par_iter().zip(a.par_iter().zip(b).zip(c)).map(turned).collect());
     Geometry { position, log_scale, opacity, rotation }
 }
 

@@ -14,6 +14,7 @@
 use crate::quantile::ranked;
 use crate::refinements::parts;
 use crate::steps::Steps;
+use rayon::prelude::*;
 use splatstream_decoder::steps::STEPS;
 use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, MAX_REFINEMENTS, SequenceParameters};
 use splatstream_gaussians::GaussianFrame;
@@ -64,7 +65,7 @@ impl Laws {
         if frame.is_empty() {
             return Self::default();
         }
-        let shapes: Vec<(f32, f32)> = (0..frame.len()).map(|row| shape(frame, row)).collect();
+        let shapes: Vec<(f32, f32)> = (0..frame.len()).into_par_iter().map(|row| shape(frame, row)).collect();
         let count = shapes.len() as f64;
         let mean = shapes.iter().map(|(area, _)| f64::from(*area)).sum::<f64>() / count;
         let mut anisotropies: Vec<f32> = shapes.iter().map(|(_, anisotropy)| *anisotropy).collect();
@@ -162,7 +163,9 @@ fn coarser(order: &[u32], shown: &[Worth], refinements: &[u8]) -> [u8; MAX_REFIN
         let least = first.map_or(f64::MIN_POSITIVE, |(mean, _)| LEAST_ENERGY * mean);
         let count = rows.len().max(1) as f64;
         let mean = rows.iter().map(of_row).sum::<f64>() / count;
-        let log = rows.iter().map(|row| libm::log2(of_row(row).max(least))).sum::<f64>() / count;
+        // Logarithms take long, and are summed in the order of the rows.
+        let logs: Vec<f64> = rows.par_iter().map(|row| libm::log2(of_row(row).max(least))).collect();
+        let log = logs.iter().sum::<f64>() / count;
         let &mut (_, of_first) = first.get_or_insert((mean, log));
         *slot = libm::round((2.0 * ENERGY_POWER * (of_first - log)).clamp(0.0, MOST_COARSER)) as u8;
     }

@@ -10,6 +10,7 @@ mod lanes;
 mod project;
 mod reach;
 mod rows;
+mod select;
 mod tile;
 
 use crate::camera::Camera;
@@ -22,6 +23,7 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use reach::reachable;
 use rows::TileRows;
+pub use select::select;
 use splatstream_gaussians::GaussianFrame;
 pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, MAX_ALPHA, Tile, blend_tile, exp2};
 
@@ -81,7 +83,7 @@ pub fn draw_strips(
     strips: Strips,
 ) -> Rendering {
     let (sight, near) = (Sight::strips(camera, strips), near(frame, camera));
-    let shown = frame.select(&reachable(frame, &sight));
+    let shown = select(frame, &reachable(frame, &sight));
     let view = View::beyond(&shown, &Shapes::of(&shown), &sight, near);
     paint(&view, &sight, background, pulp::Arch::new())
 }

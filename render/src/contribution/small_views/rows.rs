@@ -64,8 +64,10 @@ impl Rows {
             while wanted.next_if(|&wanted| wanted < number).is_some() {}
             wanted.next_if(|&wanted| wanted == number).is_some()
         };
-        let (numbers, left) = before.iter().zip(&self.all).filter(|(number, _)| is_wanted(number)).unzip();
-        (self.numbers, self.all) = (Some(numbers), left);
+        let places: Vec<usize> =
+            (0..).zip(&before).filter(|(_, number)| is_wanted(number)).map(|(place, _)| place).collect();
+        let left = places.par_iter().with_min_len(RUN).map(|&place| self.all[place]).collect();
+        (self.numbers, self.all) = (Some(places.iter().map(|&place| before[place]).collect()), left);
     }
 
     /// Positions and opacities, by rising place.
