@@ -56,21 +56,38 @@ impl<'b> PlaneContexts<'b> {
     }
 }
 
+/// Adds vectors to others.
+#[inline(always)]
+fn add<M: Machine, const COUNT: usize>(machine: M, sums: &mut [M::V; COUNT], terms: &[M::V; COUNT]) {
+    for (sum, &term) in sums.iter_mut().zip(terms) {
+        *sum = machine.add(*sum, term);
+    }
+}
+
 impl<M: Machine> Contexts<M, i32> for PlaneContexts<'_> {
     #[inline(always)]
-    fn add_known(&self, machine: M, first: [usize; WIDE], contexts: &mut [M::V; WIDE]) {
+    fn known(&self, machine: M, first: [usize; WIDE]) -> Option<[M::V; WIDE]> {
+        let mut known: Option<[M::V; WIDE]> = None;
         for axis in &self.axes {
             if let AxisValues::Known(values) = &axis.values {
-                axis.lookup.add(machine, &values.vectors(machine, first), contexts);
+                let mut contexts = values.vectors(machine, first);
+                axis.lookup.contexts(machine, &mut contexts);
+                if let Some(known) = known {
+                    add(machine, &mut contexts, &known);
+                }
+                known = Some(contexts);
             }
         }
+        known
     }
 
     #[inline(always)]
     fn add_serial<const GROUPS: usize>(&self, machine: M, contexts: &mut [M::V; GROUPS]) {
         for axis in &self.axes {
             if let AxisValues::Serial(sums) = &axis.values {
-                axis.lookup.add(machine, &sums.vectors(machine), contexts);
+                let mut of_axis = sums.vectors(machine);
+                axis.lookup.contexts(machine, &mut of_axis);
+                add(machine, contexts, &of_axis);
             }
         }
     }
@@ -132,7 +149,9 @@ impl<'b> DeltaContexts<'b> {
 
 impl<M: Machine> Contexts<M, u64> for DeltaContexts<'_> {
     #[inline(always)]
-    fn add_known(&self, _: M, _: [usize; WIDE], _: &mut [M::V; WIDE]) {}
+    fn known(&self, _: M, _: [usize; WIDE]) -> Option<[M::V; WIDE]> {
+        None
+    }
 
     #[inline(always)]
     fn add_serial<const GROUPS: usize>(&self, machine: M, contexts: &mut [M::V; GROUPS]) {
@@ -141,7 +160,9 @@ impl<M: Machine> Contexts<M, u64> for DeltaContexts<'_> {
             *slot = vector(machine, &neighbours.each_ref().map(DeltaNeighbours::value));
         }
         for lookup in self.axes.iter().flatten() {
-            lookup.add(machine, &values, contexts);
+            let mut of_axis = values;
+            lookup.contexts(machine, &mut of_axis);
+            add(machine, contexts, &of_axis);
         }
     }
 

@@ -138,32 +138,36 @@ impl AxisLookup {
         count.fold(0, u8::wrapping_add).wrapping_mul(self.factor)
     }
 
-    /// Adds the contexts of vectors of signed values to others.
+    /// Turns vectors of signed values into their contexts.
     ///
     /// A loop and no closure: what is called in a closure is not compiled for the machine unless it is inlined.
     #[inline(always)]
-    pub fn add<M: Machine, const COUNT: usize>(
-        &self,
-        machine: M,
-        values: &[M::V; COUNT],
-        contexts: &mut [M::V; COUNT],
-    ) {
+    pub fn contexts<M: Machine, const COUNT: usize>(&self, machine: M, values: &mut [M::V; COUNT]) {
         let factor = machine.splat(self.factor.into());
-        if let (Some(thresholds), (fours, [])) = (&self.narrow, values.as_chunks::<4>()) {
-            for (values, contexts) in fours.iter().zip(contexts.as_chunks_mut::<4>().0) {
-                for (context, count) in contexts.iter_mut().zip(machine.reached(*values, thresholds)) {
-                    *context = machine.add(*context, machine.mul(count, factor));
+        if let (Some(thresholds), (fours, [])) = (&self.narrow, values.as_chunks_mut::<4>()) {
+            for values in fours {
+                *values = machine.reached(*values, thresholds);
+                for count in values {
+                    *count = machine.mul(*count, factor);
                 }
             }
             return;
         }
-        for (context, &value) in contexts.iter_mut().zip(values) {
-            let mut count = machine.splat(u32::try_from(self.thresholds.len()).unwrap_or(0));
-            for &threshold in &self.thresholds {
-                count = machine.add(count, machine.greater(machine.splat(threshold.cast_unsigned()), value));
-            }
-            *context = machine.add(*context, machine.mul(count, factor));
+        for value in values {
+            *value = machine.mul(self.reached(machine, *value), factor);
         }
+    }
+
+    /// How many thresholds of 32 bits each value of a vector reaches. They are rare: on WebAssembly, where vectors are not
+    /// enabled by function, this is code of its own, and once.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    fn reached<M: Machine>(&self, machine: M, values: M::V) -> M::V {
+        let mut count = machine.splat(u32::try_from(self.thresholds.len()).unwrap_or(0));
+        for &threshold in &self.thresholds {
+            count = machine.add(count, machine.greater(machine.splat(threshold.cast_unsigned()), values));
+        }
+        count
     }
 
     /// Adds the contexts of some values to others.

@@ -121,9 +121,10 @@ impl PlaneDecoder {
 
 /// The contexts of the symbols of a plane.
 pub trait Contexts<M: Machine, V> {
-    /// Adds what is known beforehand of the contexts of eight entries of each of eight lanes: the entries at `first` and
-    /// those after them. What is added for entries that there are not means nothing.
-    fn add_known(&self, machine: M, first: [usize; WIDE], contexts: &mut [M::V; WIDE]);
+    /// What is known beforehand of the contexts of eight entries of each of eight lanes: the entries at `first` and those
+    /// after them. `None` if nothing is known of any entry of the plane. Values for entries that are not there have no
+    /// meaning.
+    fn known(&self, machine: M, first: [usize; WIDE]) -> Option<[M::V; WIDE]>;
 
     /// Adds what follows from the values before to the contexts of a step.
     fn add_serial<const GROUPS: usize>(&self, machine: M, contexts: &mut [M::V; GROUPS]);
@@ -138,13 +139,13 @@ pub struct KnownContexts<'c>(pub &'c [u8]);
 
 impl<M: Machine, V> Contexts<M, V> for KnownContexts<'_> {
     #[inline(always)]
-    fn add_known(&self, machine: M, first: [usize; WIDE], contexts: &mut [M::V; WIDE]) {
-        for (slot, first) in contexts.iter_mut().zip(first) {
+    fn known(&self, machine: M, first: [usize; WIDE]) -> Option<[M::V; WIDE]> {
+        Some(first.map(|first| {
             let mut of_lane = [0; WIDE];
             let known = self.0.get(first..).unwrap_or_default();
             of_lane.iter_mut().zip(known).for_each(|(slot, &context)| *slot = context.into());
-            *slot = machine.add(*slot, machine.load(of_lane));
-        }
+            machine.load(of_lane)
+        }))
     }
 
     #[inline(always)]
@@ -178,9 +179,10 @@ struct Words<'a> {
 type Ahead = [[u8; 2]; MAX_LANES + WIDE];
 
 impl Words<'_> {
-    /// The next words, where they are, or in `copy` if there are fewer.
+    /// The next words, where they are, or in `copy` if there are fewer: only then is that filled, since engines of
+    /// WebAssembly fill arrays by a call.
     #[inline(always)]
-    fn ahead<'w>(&'w self, copy: &'w mut Ahead) -> &'w Ahead {
+    fn ahead<'w>(&'w self, copy: &'w mut Option<Ahead>) -> &'w Ahead {
         let rest = self.words.get(self.next..).unwrap_or_default();
         match rest.first_chunk() {
             Some(words) => words,
@@ -189,7 +191,8 @@ impl Words<'_> {
     }
 
     #[cold]
-    fn last<'w>(rest: &[[u8; 2]], copy: &'w mut Ahead) -> &'w Ahead {
+    fn last<'w>(rest: &[[u8; 2]], copy: &'w mut Option<Ahead>) -> &'w Ahead {
+        let copy = copy.insert([[0; 2]; MAX_LANES + WIDE]);
         copy.iter_mut().zip(rest).for_each(|(slot, word)| *slot = *word);
         copy
     }
@@ -269,9 +272,9 @@ impl<'a> BlockReader<'a> {
         for start in (0..segments.length()).step_by(WIDE) {
             for (known, lanes) in known.iter_mut().zip(&lanes) {
                 let first = lanes.each_ref().map(|lane| lane.start.wrapping_add(start));
-                let mut rows = [machine.splat(0); WIDE];
-                contexts.add_known(machine, first, &mut rows);
-                *known = machine.transpose(rows);
+                if let Some(rows) = contexts.known(machine, first) {
+                    *known = machine.transpose(rows);
+                }
             }
             let steps = start..segments.length().min(start.wrapping_add(WIDE));
             let tile = Tile { plane, known: &known, steps, segments };
@@ -295,6 +298,7 @@ impl<'a> BlockReader<'a> {
         values: &mut [[[S::Stored; WIDE]; WIDE]; GROUPS],
     ) {
         let Tile { plane, known, steps, segments } = tile;
+        let mut decoded = [[S::Stored::default(); WIDE]; GROUPS];
         for (row, step) in steps.enumerate() {
             let mut of_step = [plane.machine.splat(0); GROUPS];
             for (of_step, known) in of_step.iter_mut().zip(known) {
@@ -302,30 +306,30 @@ impl<'a> BlockReader<'a> {
             }
             contexts.add_serial(plane.machine, &mut of_step);
             let active = if WHOLE { segments.lanes() } else { segments.active(step) };
-            let decoded = self.step::<S, M, GROUPS, WHOLE>(plane, of_step, active);
+            self.step::<S, M, GROUPS, WHOLE>(plane, of_step, active, &mut decoded);
             contexts.follow(plane.machine, &decoded);
-            for (values, decoded) in values.iter_mut().zip(decoded) {
-                values.get_mut(row).into_iter().for_each(|slot| *slot = decoded);
+            for (values, decoded) in values.iter_mut().zip(&decoded) {
+                values.get_mut(row).into_iter().for_each(|slot| *slot = *decoded);
             }
         }
     }
 
-    /// One symbol of each lane below `active`, which are all lanes of the block if it is `WHOLE`; the values of other lanes mean nothing. Each loop does a part of the work for
-    /// all lanes: loads that are slow wait together.
+    /// Reads one symbol of each lane below `active`, which are all lanes of the block if it is `WHOLE`; the values of other
+    /// lanes mean nothing. Each loop does a part of the work for all lanes: loads that are slow wait together.
     #[inline(always)]
     fn step<S: Symbol, M: Machine, const GROUPS: usize, const WHOLE: bool>(
         &mut self,
         plane: &Plane<'_, M>,
         contexts: [M::V; GROUPS],
         active: usize,
-    ) -> [[S::Stored; WIDE]; GROUPS] {
+        values: &mut [[S::Stored; WIDE]; GROUPS],
+    ) {
         let machine = plane.machine;
-        let mut values = [[S::Stored::default(); WIDE]; GROUPS];
         let mut lane_of_group = machine.load([0, 1, 2, 3, 4, 5, 6, 7]);
         let active_lanes = machine.splat(u32::try_from(active).unwrap_or(0));
         let mut is_split = machine.splat(0);
         let last_direct = machine.splat(plane.decoder.direct.wrapping_sub(1));
-        let mut copy = [[0; 2]; MAX_LANES + WIDE];
+        let mut copy = None;
         let words = self.words.ahead(&mut copy);
         let mut taken = 0_usize;
         for ((values, states), contexts) in values.iter_mut().zip(&mut self.states).zip(contexts) {
@@ -361,7 +365,6 @@ impl<'a> BlockReader<'a> {
                 }
             }
         }
-        values
     }
 
     /// Checks that the block ends here: every state back at its start, words and bits used up.

@@ -5,7 +5,7 @@ use core::arch::wasm32::{
     i16x8_add, i16x8_eq, i16x8_gt, i16x8_narrow_i32x4, i16x8_splat, i32x4_abs, i32x4_add, i32x4_bitmask,
     i32x4_dot_i16x8, i32x4_gt, i32x4_mul, i32x4_shr, i32x4_shuffle, i32x4_sub, i64x2_shuffle, u8x16_add_sat,
     u8x16_splat, u8x16_swizzle, u32x4_extend_high_u16x8, u32x4_extend_low_u16x8, u32x4_shl, u32x4_shr,
-    u32x4_splat, v128, v128_and, v128_any_true, v128_bitselect, v128_or, v128_xor,
+    u32x4_splat, v128, v128_and, v128_andnot, v128_any_true, v128_or, v128_xor,
 };
 use pulp::cast;
 
@@ -66,9 +66,14 @@ fn advance_four(state: v128, next: v128, mask: v128, words: v128, skipped: u8) -
     let own = OWN_WORD.get(usize::from(set & 15)).copied().unwrap_or_default();
     let places = u8x16_add_sat(cast(own), u8x16_splat(skipped.wrapping_mul(2)));
     let filled = v128_or(u32x4_shl(next, 16), u8x16_swizzle(words, places));
-    let next = v128_bitselect(filled, next, takes);
     let taken = u8::try_from(set.count_ones()).unwrap_or(0);
-    (v128_bitselect(next, state, mask), taken)
+    (select(mask, select(takes, filled, next), state), taken)
+}
+
+/// One of two by a mask. Compilers see through this where the mask is constant, and through the instruction for it not.
+#[inline(always)]
+fn select(mask: v128, set: v128, clear: v128) -> v128 {
+    v128_or(v128_and(set, mask), v128_andnot(clear, mask))
 }
 
 impl Machine for Simd128 {
