@@ -71,7 +71,12 @@ fn largest(values: [f32; 4]) -> usize {
 pub fn canonical(log_scale: [f32; 3], rotation: [f32; 4], sort: bool) -> ([f32; 3], [f32; 4]) {
     let mut order = [0, 1, 2];
     if sort {
-        order.sort_by(|&a, &b| log_scale[b].total_cmp(&log_scale[a]));
+        // Neighbours change places only where the second is larger: equal ones stay in their order.
+        for [first, second] in [[0, 1], [1, 2], [0, 1]] {
+            if log_scale[order[first]].total_cmp(&log_scale[order[second]]).is_lt() {
+                order.swap(first, second);
+            }
+        }
     }
     let sorted = order.map(|axis| log_scale[axis]);
     let squares: f32 = rotation.iter().map(|component| component * component).sum();
@@ -115,6 +120,24 @@ mod tests {
         let squares = log_scale.map(|scale| libm::exp(2.0 * f64::from(scale)));
         let entry = |i: usize, j: usize| (0..3).map(|k| r[i][k] * squares[k] * r[j][k]).sum();
         [0, 1, 2].map(|i| [0, 1, 2].map(|j| entry(i, j)))
+    }
+
+    #[test]
+    fn axes_of_equal_length_stay_in_their_order() {
+        // With a turn about each axis of another angle the order shows in the rotation alone.
+        let turn = [0.9, 0.1, 0.2, 0.3];
+        let lengths = [-1.0_f32, 0.0, 1.0];
+        for scales in
+            lengths.iter().flat_map(|a| lengths.iter().flat_map(move |b| lengths.map(|c| [*a, *b, c])))
+        {
+            let mut order = [0, 1, 2];
+            order.sort_by(|&a, &b| scales[b].total_cmp(&scales[a]));
+            let (sorted, rotation) = canonical(scales, turn, true);
+            assert_eq!(sorted, order.map(|axis| scales[axis]));
+            let squares: f32 = turn.iter().map(|part| part * part).sum();
+            let unit = turn.map(|part| part / squares.sqrt());
+            assert_eq!(rotation, smallest_turn(product(unit, permutation(order))), "{scales:?}");
+        }
     }
 
     proptest! {
