@@ -117,6 +117,7 @@ impl<'a> BitReader<'a> {
 #[derive(Debug, Clone, Default)]
 pub struct BitWriter {
     bytes: Vec<u8>,
+    /// The bits that do not fill eight bytes yet, and how many they are: fewer than 64. Higher ones are 0.
     pending: u64,
     pending_bits: u32,
 }
@@ -132,13 +133,13 @@ impl BitWriter {
     pub fn bits(&mut self, value: u64, count: u32) {
         let value = value & 1_u64.wrapping_shl(count).wrapping_sub(1);
         self.pending |= value.wrapping_shl(self.pending_bits);
-        self.pending_bits = self.pending_bits.wrapping_add(count);
-        while self.pending_bits >= 8 {
-            let [low, ..] = self.pending.to_le_bytes();
-            self.bytes.push(low);
-            self.pending = self.pending.wrapping_shr(8);
-            self.pending_bits = self.pending_bits.wrapping_sub(8);
+        let filled = self.pending_bits.wrapping_add(count);
+        if filled >= 64 {
+            self.bytes.extend_from_slice(&self.pending.to_le_bytes());
+            // Seven bits or more were pending, since no more than 57 are added.
+            self.pending = value.wrapping_shr(64_u32.wrapping_sub(self.pending_bits));
         }
+        self.pending_bits = filled & 63;
     }
 
     /// Descriptor ue, `value` at most 2^32 - 2.
@@ -166,8 +167,8 @@ impl BitWriter {
 
     /// Pads with zero bits to a whole byte.
     pub fn into_bytes(mut self) -> Vec<u8> {
-        let padding = self.pending_bits.wrapping_neg() & 7;
-        self.bits(0, padding);
+        let bytes = self.pending.to_le_bytes();
+        self.bytes.extend(bytes.iter().zip((0..self.pending_bits).step_by(8)).map(|(&byte, _)| byte));
         self.bytes
     }
 }

@@ -8,6 +8,7 @@ use super::{FREQUENCY_BITS, MAX_LANES, STATE_LOW};
 use crate::bits::BitWriter;
 use crate::payload::write_leb128;
 use crate::{Error, ErrorKind, Result};
+use std::borrow::Cow;
 
 /// Contexts of a plane, at most, for which a place is kept: all that a byte can name.
 const CONTEXTS: usize = 1 << 8;
@@ -64,22 +65,27 @@ impl PlaneEncoder {
 #[derive(Debug)]
 pub struct BlockWriter {
     lanes_log2: u8,
-    /// Plane by plane, as the values stand there.
+    /// Plane by plane, as the values stand there, but lanes a [`stride`] apart.
     symbols: Vec<Symbol>,
-    /// Values of each plane.
-    lengths: Vec<usize>,
+    /// Where each plane starts among the symbols, and its segments.
+    planes: Vec<(usize, Segments)>,
     raw: BitWriter,
+}
+
+/// Symbols of a cache line.
+const SYMBOLS_OF_LINE: usize = 16;
+
+/// How far apart the first symbols of two lanes are in memory: a cache line farther than they need be. Lanes take turns, and
+/// segments of a power of two would have all of their symbols in a few sets of the cache, which hold fewer lines than there are
+/// lanes.
+const fn stride(segments: Segments) -> usize {
+    segments.length().wrapping_add(SYMBOLS_OF_LINE)
 }
 
 impl BlockWriter {
     /// An empty block with 2^`lanes_log2` states, at most 32.
     pub fn new(lanes_log2: u8) -> Self {
-        Self {
-            lanes_log2: lanes_log2.min(5),
-            symbols: Vec::new(),
-            lengths: Vec::new(),
-            raw: BitWriter::new(),
-        }
+        Self { lanes_log2: lanes_log2.min(5), symbols: Vec::new(), planes: Vec::new(), raw: BitWriter::new() }
     }
 
     /// Adds a plane: unsigned values and their contexts (empty: all 0).
@@ -93,37 +99,44 @@ impl BlockWriter {
         values: impl ExactSizeIterator<Item = u64>,
     ) -> Result<()> {
         let values: Vec<u64> = values.collect();
-        let contexts = contexts.iter().copied().chain(core::iter::repeat(0));
+        let mut contexts = Cow::Borrowed(contexts);
+        if contexts.len() < values.len() {
+            contexts.to_mut().resize(values.len(), 0);
+        }
+        let (start, segments) = (self.symbols.len(), Segments::new(values.len(), self.lanes_log2));
         let mut can_be_coded = true;
         let mut has_raw_bits = false;
-        self.symbols.extend(values.iter().zip(contexts).map(|(&value, context)| {
-            let token = split(value, encoder.direct_log2);
-            let symbol = encoder.symbol(context, token.token);
-            can_be_coded &= symbol.frequency > 0;
-            has_raw_bits |= token.raw_bits > 0;
-            symbol
-        }));
+        let lanes = values.chunks(segments.length()).zip(contexts.chunks(segments.length()));
+        for (lane, (values, contexts)) in lanes.enumerate() {
+            let first = start.wrapping_add(lane.wrapping_mul(stride(segments)));
+            self.symbols.resize(first, Symbol::default());
+            self.symbols.extend(values.iter().zip(contexts).map(|(&value, &context)| {
+                let token = split(value, encoder.direct_log2);
+                let symbol = encoder.symbol(context, token.token);
+                can_be_coded &= symbol.frequency > 0;
+                has_raw_bits |= token.raw_bits > 0;
+                symbol
+            }));
+        }
         if !can_be_coded {
             let rule = "a coded token has a frequency of at least 1";
             return Err(Error::new(0, "8.3", ErrorKind::Constraint { rule }));
         }
         if has_raw_bits {
-            self.raw_bits(encoder.direct_log2, &values);
+            self.raw_bits(encoder.direct_log2, &values, segments);
         }
-        self.lengths.push(values.len());
+        self.planes.push((start, segments));
         Ok(())
     }
 
     /// Writes what tokens do not say of values, in reading order.
-    fn raw_bits(&mut self, direct_log2: u8, values: &[u64]) {
-        let segments = Segments::new(values.len(), self.lanes_log2);
+    fn raw_bits(&mut self, direct_log2: u8, values: &[u64], segments: Segments) {
         let direct = 1_u64.wrapping_shl(direct_log2.into());
         for step in 0..segments.length() {
             for &value in values.iter().skip(step).step_by(segments.length()) {
-                if value >= direct {
-                    let token = split(value, direct_log2);
-                    self.raw.bits(token.raw, token.raw_bits);
-                }
+                // None are written of a token of its own, without a branch that would often be taken wrongly.
+                let below_top = (value | direct).ilog2().wrapping_sub(2);
+                self.raw.bits(value, if value < direct { 0 } else { below_top });
             }
         }
     }
@@ -132,10 +145,8 @@ impl BlockWriter {
     pub fn finish(self) -> Vec<u8> {
         let mut states = States::new(self.symbols.len());
         let mut end = self.symbols.len();
-        for length in self.lengths.iter().rev() {
-            let start = end.wrapping_sub(*length);
-            let plane = self.symbols.get(start..end).unwrap_or_default();
-            states.code(plane, Segments::new(*length, self.lanes_log2));
+        for &(start, segments) in self.planes.iter().rev() {
+            states.code(self.symbols.get(start..end).unwrap_or_default(), segments);
             end = start;
         }
         let lanes = 1_usize.wrapping_shl(u32::from(self.lanes_log2));
@@ -147,9 +158,10 @@ impl BlockWriter {
         for state in states.of_lanes.iter().take(lanes) {
             bytes.extend_from_slice(&state.to_le_bytes());
         }
-        for word in words.iter().rev() {
-            bytes.extend_from_slice(&word.to_le_bytes());
-        }
+        let start = bytes.len();
+        bytes.resize(start.wrapping_add(words.len().wrapping_mul(2)), 0);
+        let (places, _) = bytes.get_mut(start..).unwrap_or_default().as_chunks_mut::<2>();
+        places.iter_mut().zip(words.iter().rev()).for_each(|(place, word)| *place = word.to_le_bytes());
         bytes.extend_from_slice(&raw);
         bytes
     }
@@ -200,11 +212,12 @@ impl States {
 
     /// Codes the symbols of a plane, from the last that is read to the first.
     fn code(&mut self, plane: &[Symbol], segments: Segments) {
+        let stride = stride(segments);
         for step in (0..segments.length()).rev() {
             let active = segments.active(step);
-            let mut index = step.wrapping_add(active.wrapping_mul(segments.length()));
+            let mut index = step.wrapping_add(active.wrapping_mul(stride));
             for state in self.of_lanes.iter_mut().take(active).rev() {
-                index = index.wrapping_sub(segments.length());
+                index = index.wrapping_sub(stride);
                 let Symbol { frequency, first } = plane.get(index).copied().unwrap_or_default();
                 let frequency = u32::from(frequency);
                 // A word leaves a state that would grow too large. It is written in any case, and counted if it leaves: what
