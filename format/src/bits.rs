@@ -167,8 +167,8 @@ impl BitWriter {
 
     /// Pads with zero bits to a whole byte.
     pub fn into_bytes(mut self) -> Vec<u8> {
-        let bytes = self.pending.to_le_bytes();
-        self.bytes.extend(bytes.iter().zip((0..self.pending_bits).step_by(8)).map(|(&byte, _)| byte));
+        let begun = 0..self.pending_bits.div_ceil(8);
+        self.bytes.extend(begun.zip(self.pending.to_le_bytes()).map(|(_, byte)| byte));
         self.bytes
     }
 }

@@ -47,16 +47,25 @@ pub struct Token {
 /// exponent and the two bits below the leading one.
 #[inline]
 pub fn split(value: u64, direct_log2: u8) -> Token {
+    let raw_bits = raw_bits(value, direct_log2);
     let direct_log2 = u32::from(direct_log2);
     if value < 1_u64.wrapping_shl(direct_log2) {
         let [token, ..] = value.to_le_bytes();
-        return Token { token, raw_bits: 0, raw: 0 };
+        return Token { token, raw_bits, raw: 0 };
     }
     let exponent = value.ilog2();
-    let raw_bits = exponent.wrapping_sub(2);
     let [top, ..] = value.wrapping_shr(raw_bits).to_le_bytes();
     let [token, ..] = token_base(direct_log2, exponent).wrapping_add(u32::from(top & 3)).to_le_bytes();
     Token { token, raw_bits, raw: value & 1_u64.wrapping_shl(raw_bits).wrapping_sub(1) }
+}
+
+/// How many raw bits [`split`] leaves of a value: those below the three highest, none of a token of its own. Without a branch,
+/// which would often be taken wrongly.
+#[inline]
+pub(super) fn raw_bits(value: u64, direct_log2: u8) -> u32 {
+    let direct = 1_u64.wrapping_shl(direct_log2.into());
+    let below_top = (value | direct).ilog2().wrapping_sub(2);
+    if value < direct { 0 } else { below_top }
 }
 
 /// The smallest value of a token and its number of raw bits; the inverse of [`split`].

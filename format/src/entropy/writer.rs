@@ -3,7 +3,7 @@
 use super::frequencies::Frequencies;
 use super::lanes::Segments;
 use super::model::PlaneModel;
-use super::token::split;
+use super::token::{raw_bits, split};
 use super::{FREQUENCY_BITS, MAX_LANES, STATE_LOW};
 use crate::bits::BitWriter;
 use crate::payload::write_leb128;
@@ -131,12 +131,9 @@ impl BlockWriter {
 
     /// Writes what tokens do not say of values, in reading order.
     fn raw_bits(&mut self, direct_log2: u8, values: &[u64], segments: Segments) {
-        let direct = 1_u64.wrapping_shl(direct_log2.into());
         for step in 0..segments.length() {
             for &value in values.iter().skip(step).step_by(segments.length()) {
-                // None are written of a token of its own, without a branch that would often be taken wrongly.
-                let below_top = (value | direct).ilog2().wrapping_sub(2);
-                self.raw.bits(value, if value < direct { 0 } else { below_top });
+                self.raw.bits(value, raw_bits(value, direct_log2));
             }
         }
     }
