@@ -6,7 +6,7 @@
 use crate::error::Error;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::metrics::{LOSSLESS_DB, psnr};
-use splatstream_render::{Camera, PreparedFrame, Rendering, Strips, draw_strips, select, touching_strips};
+use splatstream_render::{Camera, PreparedFrame, Rendering, Strips, draw_strips, touching_strips};
 
 /// Around the scene.
 const BACKGROUND: [f32; 3] = [0.0; 3];
@@ -65,7 +65,7 @@ impl StripView {
     /// Of a frame.
     fn new(frame: &GaussianFrame, camera: &Camera, strips: Strips) -> Self {
         let rows = touching_strips(frame, camera, strips);
-        let frame = select(frame, &rows);
+        let frame = frame.select(&rows);
         let picture = PreparedFrame::new(&frame).strips(camera, BACKGROUND, strips);
         Self { camera: camera.clone(), strips, picture, frame, rows }
     }
@@ -77,7 +77,7 @@ impl StripView {
 
     /// Takes the Gaussians again from the frame that it is of.
     pub(crate) fn hold(&mut self, frame: &GaussianFrame) {
-        self.frame = select(frame, &self.rows);
+        self.frame = frame.select(&self.rows);
     }
 
     /// PSNR of another version of the same Gaussians, dB; none if nothing can be seen.

@@ -28,5 +28,5 @@ mod reference;
 
 pub use camera::Camera;
 pub use image::Image;
-pub use rasterise::{PreparedFrame, Rendering, Strips, draw_strips, render, select, touching_strips};
+pub use rasterise::{PreparedFrame, Rendering, Strips, draw_strips, render, touching_strips};
 pub use reference::ReferencePictures;

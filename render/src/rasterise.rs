@@ -10,7 +10,6 @@ mod lanes;
 mod project;
 mod reach;
 mod rows;
-mod select;
 mod tile;
 
 use crate::camera::Camera;
@@ -23,7 +22,6 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use reach::reachable;
 use rows::TileRows;
-pub use select::select;
 use splatstream_gaussians::GaussianFrame;
 pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, MAX_ALPHA, Tile, blend_tile, exp2};
 
@@ -83,7 +81,7 @@ pub fn draw_strips(
     strips: Strips,
 ) -> Rendering {
     let (sight, near) = (Sight::strips(camera, strips), near(frame, camera));
-    let shown = select(frame, &reachable(frame, &sight));
+    let shown = frame.select(&reachable(frame, &sight));
     let view = View::beyond(&shown, &Shapes::of(&shown), &sight, near);
     paint(&view, &sight, background, pulp::Arch::new())
 }

@@ -2,6 +2,7 @@
 
 use crate::rotation::normalise_rows;
 use crate::sh::{MAX_SH_DEGREE, rest_index, sh_planes};
+use rayon::prelude::*;
 use std::collections::TryReserveError;
 use std::fmt;
 use std::sync::Arc;
@@ -358,22 +359,16 @@ impl GaussianFrame {
         Planes { position, log_scale, rotation, opacity_logit, dc, sh }
     }
 
-    /// The Gaussians at `indices`, in that order; an index may come more than once.
+    /// The Gaussians at `indices`, in that order; an index may come more than once. Planes are gathered side by side: one
+    /// core waits for memory most of the time.
     ///
     /// # Panics
     /// If an index is not below [`GaussianFrame::len`].
     #[must_use]
     pub fn select(&self, indices: &[u32]) -> Self {
-        let pick = |plane: &Vec<f32>| picked(plane, indices);
-        let PlanesRef { position, log_scale, rotation, opacity_logit, dc, sh } = self.planes();
-        let planes = Planes {
-            position: position.each_ref().map(pick),
-            log_scale: log_scale.each_ref().map(pick),
-            rotation: rotation.each_ref().map(pick),
-            opacity_logit: pick(opacity_logit),
-            dc: dc.each_ref().map(pick),
-            sh: sh.iter().map(pick).collect(),
-        };
+        let mut planes = Planes::of_degree(self.sh_degree);
+        let pairs: Vec<(&mut Vec<f32>, &Vec<f32>)> = planes.iter_mut().zip(self.planes().iter()).collect();
+        pairs.into_par_iter().for_each(|(slot, plane)| *slot = picked(plane, indices));
         Self::made_of(planes, self.sh_degree, self.antialiased)
     }
 
