@@ -64,6 +64,18 @@ fn add<M: Machine, const COUNT: usize>(machine: M, sums: &mut [M::V; COUNT], ter
     }
 }
 
+/// Adds the contexts of vectors of values on an axis to others.
+#[inline(always)]
+fn add_contexts<M: Machine, const COUNT: usize>(
+    machine: M,
+    axis: &AxisLookup,
+    mut values: [M::V; COUNT],
+    contexts: &mut [M::V; COUNT],
+) {
+    axis.contexts(machine, &mut values);
+    add(machine, contexts, &values);
+}
+
 impl<M: Machine> Contexts<M, i32> for PlaneContexts<'_> {
     #[inline(always)]
     fn known(&self, machine: M, first: [usize; WIDE]) -> Option<[M::V; WIDE]> {
@@ -85,9 +97,7 @@ impl<M: Machine> Contexts<M, i32> for PlaneContexts<'_> {
     fn add_serial<const GROUPS: usize>(&self, machine: M, contexts: &mut [M::V; GROUPS]) {
         for axis in &self.axes {
             if let AxisValues::Serial(sums) = &axis.values {
-                let mut of_axis = sums.vectors(machine);
-                axis.lookup.contexts(machine, &mut of_axis);
-                add(machine, contexts, &of_axis);
+                add_contexts(machine, axis.lookup, sums.vectors(machine), contexts);
             }
         }
     }
@@ -160,9 +170,7 @@ impl<M: Machine> Contexts<M, u64> for DeltaContexts<'_> {
             *slot = vector(machine, &neighbours.each_ref().map(DeltaNeighbours::value));
         }
         for lookup in self.axes.iter().flatten() {
-            let mut of_axis = values;
-            lookup.contexts(machine, &mut of_axis);
-            add(machine, contexts, &of_axis);
+            add_contexts(machine, lookup, values, contexts);
         }
     }
 
