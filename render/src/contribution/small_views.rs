@@ -19,6 +19,8 @@ use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use rows::Rows;
 use splatstream_gaussians::GaussianFrame;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use trace::{Scene, Trace};
 
 /// A frame as cameras see it in pictures smaller than theirs, which cost less and show nearly the same of each Gaussian.
@@ -61,7 +63,8 @@ struct SmallView {
     near: f32,
 }
 
-/// Gaussians of all views that are looked at side by side, at most: each takes some 30 bytes meanwhile.
+/// Gaussians of all views that may wait for each other, at most: each takes 12 bytes meanwhile, and 16 more in those that are
+/// looked at.
 const AT_ONCE: usize = 1 << 23;
 
 impl SmallViews {
@@ -89,23 +92,73 @@ impl SmallViews {
     #[must_use]
     pub fn worth(&self) -> Vec<Worth> {
         let count = self.left.len();
-        let mut sums = vec![Worth::default(); count];
         let room = AT_ONCE.checked_div(count).unwrap_or(1).max(1);
-        let side_by_side = room.min(rayon::current_num_threads()).min(self.views.len()).max(1);
-        let mut desks: Vec<Desk> = (0..side_by_side).map(|_| Desk::default()).collect();
-        // In the order of the views, however many are looked at side by side.
-        for views in self.views.chunks(side_by_side) {
-            let look = |(view, desk): (&SmallView, &mut Desk)| {
-                pulp::Arch::new().dispatch(Look { left: &self.left, view, most: trace::MOST, desk });
-            };
-            views.par_iter().zip(&mut desks).for_each(look);
-            for desk in desks.iter().take(views.len()) {
-                let sums = sums.par_iter_mut().with_min_len(1 << 12);
-                sums.zip(&desk.shares).for_each(|(sum, share)| share.add_to(sum));
-            }
+        let mut sums = vec![Worth::default(); count];
+        for views in self.views.chunks(room) {
+            self.add_views(views, &mut sums);
         }
         sums
     }
+
+    /// Adds what some views show, each core one after the other. Sums are those of one core: what a view shows waits for the
+    /// views before it.
+    fn add_views(&self, views: &[SmallView], sums: &mut [Worth]) {
+        let queue = Mutex::new(Queue::new(sums));
+        let of_core = |_| {
+            let arch = pulp::Arch::new();
+            let mut desk = Desk::default();
+            loop {
+                let (number, shares) = locked(&queue).next();
+                let Some(view) = views.get(number) else { break };
+                desk.shares = shares;
+                arch.dispatch(Look { left: &self.left, view, most: trace::MOST, desk: &mut desk });
+                locked(&queue).take(number, core::mem::take(&mut desk.shares));
+            }
+        };
+        let cores = rayon::current_num_threads().min(views.len());
+        (0..cores).into_par_iter().with_max_len(1).for_each(of_core);
+    }
+}
+
+/// Which view is next, and the sums of what those before have shown.
+struct Queue<'a> {
+    sums: &'a mut [Worth],
+    /// Views that are looked at or have been.
+    begun: usize,
+    /// Views that have been added.
+    added: usize,
+    /// What views have shown that are not next.
+    waiting: BTreeMap<usize, Vec<Share>>,
+    /// Memory of what has been added: fresh memory takes time.
+    spare: Vec<Vec<Share>>,
+}
+
+impl<'a> Queue<'a> {
+    fn new(sums: &'a mut [Worth]) -> Self {
+        Self { sums, begun: 0, added: 0, waiting: BTreeMap::new(), spare: Vec::new() }
+    }
+
+    /// The number of the next view, and memory for what it shows.
+    fn next(&mut self) -> (usize, Vec<Share>) {
+        let number = self.begun;
+        self.begun = number.saturating_add(1);
+        (number, self.spare.pop().unwrap_or_default())
+    }
+
+    /// Takes what a view shows, and adds what has waited for no other.
+    fn take(&mut self, number: usize, shares: Vec<Share>) {
+        self.waiting.insert(number, shares);
+        while let Some(shares) = self.waiting.remove(&self.added) {
+            self.sums.iter_mut().zip(&shares).for_each(|(sum, share)| share.add_to(sum));
+            self.added = self.added.saturating_add(1);
+            self.spare.push(shares);
+        }
+    }
+}
+
+/// The queue, whatever has become of other cores.
+fn locked<'m, 'a>(queue: &'m Mutex<Queue<'a>>) -> MutexGuard<'m, Queue<'a>> {
+    queue.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// What looking from one camera takes, and gives: kept from view to view, since fresh memory takes time.

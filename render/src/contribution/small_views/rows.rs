@@ -88,5 +88,11 @@ impl Rows {
 /// All values of sixteen Gaussians side by side.
 #[inline(always)]
 pub(super) fn lanes(rows: &[Row; TILE]) -> [Lanes; VALUES] {
-    core::array::from_fn(|value| core::array::from_fn(|lane| rows[lane].0[value]))
+    let mut lanes = [[0.0; TILE]; VALUES];
+    for (lane, Row(values)) in rows.iter().enumerate() {
+        for (lanes, &value) in lanes.iter_mut().zip(values) {
+            lanes[lane] = value;
+        }
+    }
+    lanes
 }
