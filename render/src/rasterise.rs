@@ -21,7 +21,7 @@ pub(crate) use project::{Shapes, Splat, near, opacity, seen_slopes, semi_axes};
 use pulp::{Simd, WithSimd};
 use rayon::prelude::*;
 use reach::reachable;
-use rows::TileRows;
+use rows::{RowEntries, TileRows};
 use splatstream_gaussians::GaussianFrame;
 pub(crate) use tile::{Blend, LOG2_MAX_ALPHA, MAX_ALPHA, Tile, blend_tile, exp2};
 
@@ -107,7 +107,11 @@ pub(crate) fn paint(view: &View, sight: &Sight<'_>, background: [f32; 3], arch: 
     let mut alpha = vec![0.0; width * lines];
     let bands = pixels.par_chunks_mut(width * TILE).zip(alpha.par_chunks_mut(width * TILE));
     bands.zip(rows).with_max_len(1).for_each(|((pixels, alpha), row)| {
-        arch.dispatch(DrawRow { view, row, pixels, alpha, background });
+        let entries = arch.dispatch(SortRow { view, row });
+        // One row may hold nearly all that is drawn.
+        blocks(pixels, alpha, width).into_par_iter().enumerate().for_each(|(number, pixels)| {
+            arch.dispatch(DrawBlock { view, row, entries: &entries, number, pixels, background });
+        });
     });
     Rendering { colour: Image::new(width, pixels), alpha }
 }
@@ -181,35 +185,66 @@ impl View {
     }
 }
 
-/// Draws one row of tiles into the pixels of its lines.
-struct DrawRow<'a> {
+/// Tiles of a block: some of a row that lie side by side.
+const BLOCK: usize = 4;
+
+/// Colours and alpha of the pixels of a line.
+type Line<'a> = (&'a mut [[f32; 3]], &'a mut [f32]);
+
+/// The lines of each block of a row of tiles, from the pixels of that row.
+fn blocks<'a>(pixels: &'a mut [[f32; 3]], alpha: &'a mut [f32], width: usize) -> Vec<Vec<Line<'a>>> {
+    let lines = pixels.chunks_mut(width).zip(alpha.chunks_mut(width));
+    let cut = |(pixels, alpha): Line<'a>| pixels.chunks_mut(BLOCK * TILE).zip(alpha.chunks_mut(BLOCK * TILE));
+    let mut lines: Vec<_> = lines.map(cut).collect();
+    (0..width.div_ceil(BLOCK * TILE)).map(|_| lines.iter_mut().filter_map(Iterator::next).collect()).collect()
+}
+
+/// Sorts the ellipses of a row into its tiles.
+struct SortRow<'a> {
     view: &'a View,
     row: usize,
-    pixels: &'a mut [[f32; 3]],
-    alpha: &'a mut [f32],
+}
+
+impl WithSimd for SortRow<'_> {
+    type Output = RowEntries;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> RowEntries {
+        let View { splats, rows } = self.view;
+        rows.entries(self.row, splats)
+    }
+}
+
+/// Draws one block of a row of tiles.
+struct DrawBlock<'a> {
+    view: &'a View,
+    row: usize,
+    entries: &'a RowEntries,
+    number: usize,
+    pixels: Vec<Line<'a>>,
     background: [f32; 3],
 }
 
-impl WithSimd for DrawRow<'_> {
+impl WithSimd for DrawBlock<'_> {
     type Output = ();
 
     #[inline(always)]
-    #[expect(clippy::indexing_slicing, reason = "tiles lie within the picture, lanes and lines within tiles")]
+    #[expect(clippy::indexing_slicing, reason = "tiles lie within the block, lanes and lines within tiles")]
     #[expect(clippy::arithmetic_side_effects, reason = "sizes of a picture in memory")]
     fn with_simd<S: Simd>(self, _: S) {
         let View { splats, rows } = self.view;
-        let entries = rows.entries(self.row, splats);
-        let [width, _] = rows.size();
-        for column in 0..entries.tiles() {
-            let mut tile = Tile::new(self.row, column, rows.size());
+        let Self { row, entries, number, mut pixels, background, .. } = self;
+        let first = number * BLOCK;
+        for column in first..entries.tiles().min(first + BLOCK) {
+            let mut tile = Tile::new(row, column, rows.size());
             let mut ink = Ink::default();
             blend_tile(splats, entries.of_tile(column), &mut tile, &mut ink);
-            let left = column * TILE;
-            let lines = self.pixels.chunks_mut(width).zip(self.alpha.chunks_mut(width));
-            for ((pixels, alpha), (light, passed)) in lines.zip(ink.light.iter().zip(tile.transmittance())) {
+            let left = (column - first) * TILE;
+            let lines = pixels.iter_mut().zip(ink.light.iter().zip(tile.transmittance()));
+            for ((pixels, alpha), (light, passed)) in lines {
                 let line = pixels[left..].iter_mut().zip(&mut alpha[left..]).take(TILE);
                 for (lane, (pixel, alpha)) in line.enumerate() {
-                    *pixel = [0, 1, 2].map(|c| light[c][lane] + passed[lane] * self.background[c]);
+                    *pixel = [0, 1, 2].map(|c| light[c][lane] + passed[lane] * background[c]);
                     *alpha = 1.0 - passed[lane];
                 }
             }
