@@ -29,9 +29,15 @@ impl Block {
     /// Red, green and blue of each, as they are seen from a position.
     #[inline(always)]
     pub(super) fn colours(&self, frame: &GaussianFrame, position: [f32; 3]) -> [Lanes; 3] {
-        let dc = frame.dc().each_ref().map(|plane| self.of(plane));
         let constant = SH_C0 as f32;
-        let mut colours = dc.map(|lanes| lanes.map(|dc| 0.5 + constant * dc));
+        // Loops, here and below: closures of `map` are not compiled for the machine unless they are inlined.
+        let mut colours = [[0.0; TILE]; 3];
+        for (colour, plane) in colours.iter_mut().zip(frame.dc()) {
+            let dc = self.of(plane);
+            for lane in 0..TILE {
+                colour[lane] = 0.5 + constant * dc[lane];
+            }
+        }
         let coefficients = sh_coefficients(frame.sh_degree());
         if coefficients > 0 {
             let bases = bases(self.directions(frame, position));
@@ -45,19 +51,23 @@ impl Block {
                 }
             }
         }
-        colours.map(|channel| channel.map(|value| value.max(0.0)))
+        for value in colours.as_flattened_mut() {
+            *value = value.max(0.0);
+        }
+        colours
     }
 
     /// Where they lie, of length 1; 0 for one that is at the position itself.
     #[inline(always)]
     fn directions(&self, frame: &GaussianFrame, position: [f32; 3]) -> [Lanes; 3] {
-        let mut offsets = frame.position().each_ref().map(|plane| self.of(plane));
+        let [x, y, z] = frame.position();
+        let mut offsets = [self.of(x), self.of(y), self.of(z)];
         for (offset, position) in offsets.iter_mut().zip(position) {
             offset.iter_mut().for_each(|offset| *offset -= position);
         }
         let mut inverse = [0.0; TILE];
         for lane in 0..TILE {
-            let [x, y, z] = offsets.each_ref().map(|offset| offset[lane]);
+            let [x, y, z] = [offsets[0][lane], offsets[1][lane], offsets[2][lane]];
             let of_length = 1.0 / (x * x + y * y + z * z).sqrt();
             inverse[lane] = of_length;
         }

@@ -136,7 +136,7 @@ impl WithSimd for ProjectChunk<'_> {
                 let colours = block.colours(view.frame, view.position.to_array());
                 for (_, splat) in &mut splats[first..] {
                     let lane = splat.colour[0] as usize;
-                    splat.colour = colours.each_ref().map(|channel| channel[lane]);
+                    splat.colour = [colours[0][lane], colours[1][lane], colours[2][lane]];
                 }
             }
         }
@@ -182,7 +182,9 @@ impl<'a> View<'a> {
     /// The depth of a Gaussian, and its ellipse without colour; none if it cannot be seen.
     #[inline(always)]
     fn ellipse(&self, row: usize, shape: &Shape) -> Option<(f32, Splat)> {
-        let offset = Vec3::from(self.frame.position().each_ref().map(|plane| plane[row])) - self.position;
+        // Arrays are spelled out, here and below: closures of `map` are not compiled for the machine unless they are inlined.
+        let [x, y, z] = self.frame.position();
+        let offset = Vec3::new(x[row], y[row], z[row]) - self.position;
         let at = self.to_camera * offset;
         if at.z.is_nan() || at.z < self.near || self.is_outside(at, shape.longest) {
             return None;
@@ -198,7 +200,10 @@ impl<'a> View<'a> {
         if !(reach > 0.0 && determinant.is_finite()) {
             return None;
         }
-        let centre = [0, 1].map(|axis| self.focal[axis] * (at[axis] / at.z) + self.principal[axis]);
+        let centre = [
+            self.focal[0] * (at.x / at.z) + self.principal[0],
+            self.focal[1] * (at.y / at.z) + self.principal[1],
+        ];
         let extent = [(reach * wide).sqrt(), (reach * tall).sqrt()];
         let touches = |axis: usize| {
             centre[axis] + extent[axis] >= 0.0 && centre[axis] - extent[axis] <= self.size[axis]
@@ -227,15 +232,16 @@ impl<'a> View<'a> {
     #[inline(always)]
     fn is_outside(&self, at: Vec3, longest: f32) -> bool {
         let near = 1.0 / at.z;
-        let bounds = [0, 1].map(|axis: usize| {
+        let mut bounds = [(0.0, 0.0); 2];
+        for axis in 0..2 {
             let slope = at[axis] * near;
             let (least, most) = self.slopes[axis];
             let seen = slope.clamp(least, most);
             let scale = self.focal[axis] * near * longest;
             let reach = 3.4 * (scale * scale * (1.0 + seen * seen) + LOW_PASS).sqrt() + 1.0;
             let centre = self.focal[axis] * slope + self.principal[axis];
-            (centre - reach, centre + reach)
-        });
+            bounds[axis] = (centre - reach, centre + reach);
+        }
         let is_beside = (0..2).any(|axis: usize| bounds[axis].1 < 0.0 || bounds[axis].0 > self.size[axis]);
         is_beside || !self.is_in_strips(bounds[1].0, bounds[1].1)
     }
@@ -247,7 +253,8 @@ impl<'a> View<'a> {
         if self.strips.every <= 1 {
             return true;
         }
-        let [top, bottom] = [top, bottom].map(|line| line / TILE as f32 - self.strips.first as f32);
+        let first = self.strips.first as f32;
+        let (top, bottom) = (top / TILE as f32 - first, bottom / TILE as f32 - first);
         // The first strip that ends below the top begins above the bottom.
         let strip = ((top - 1.0) / every).ceil() * every;
         strip <= bottom || strip.is_nan()
@@ -257,14 +264,13 @@ impl<'a> View<'a> {
     #[inline(always)]
     fn covariance(&self, shape: &Shape, at: Vec3) -> Covariance {
         let near = 1.0 / at.z;
-        let [x, y] = [0, 1].map(|axis| {
-            let (least, most) = self.slopes[axis];
-            (at[axis] * near).clamp(least, most)
-        });
+        let [(least_x, most_x), (least_y, most_y)] = self.slopes;
+        let (x, y) = ((at.x * near).clamp(least_x, most_x), (at.y * near).clamp(least_y, most_y));
         let across = (self.rows[0] - self.rows[2] * x) * (self.focal[0] * near);
         let down = (self.rows[1] - self.rows[2] * y) * (self.focal[1] * near);
-        let u = Vec3::from(shape.axes.map(|axis| across.dot(axis)));
-        let v = Vec3::from(shape.axes.map(|axis| down.dot(axis)));
+        let [a, b, c] = shape.axes;
+        let u = Vec3::new(across.dot(a), across.dot(b), across.dot(c));
+        let v = Vec3::new(down.dot(a), down.dot(b), down.dot(c));
         // Lagrange's identity: never negative, where |u|²·|v|² - (u·v)² may lose every digit.
         let determinant = u.cross(v).length_squared();
         Covariance { xx: u.length_squared(), xy: u.dot(v), yy: v.length_squared(), determinant }
