@@ -1,6 +1,7 @@
 //! Values that no frame may hold.
 
 use crate::frame::GaussianFrame;
+use rayon::prelude::*;
 use std::fmt;
 
 /// A value that no frame may hold.
@@ -46,6 +47,9 @@ impl fmt::Display for DefectKind {
 /// Values that are looked at together: more than vectors need, and few enough to end soon where one is bad.
 const AT_ONCE: usize = 1 << 12;
 
+/// And so many times as many by one core, at least.
+const PARTS: usize = 1 << 4;
+
 /// What is called a quaternion without direction.
 const ROTATION: &str = "rot_0..rot_3";
 
@@ -67,9 +71,10 @@ impl GaussianFrame {
     /// # Errors
     /// The first bad value of the first bad plane: position, DC, SH, opacity, scale, rotation.
     pub fn validate(&self) -> Result<(), Defect> {
-        // Nearly all frames are sound, and so are nearly all planes of the others: that is found out in whole vectors.
+        // Nearly all frames are sound: that is found out in whole vectors, on all cores.
         let is_sound = |plane: &[f32]| !plane.iter().fold(false, |is_bad, value| is_bad | !value.is_finite());
-        if !self.planes().iter().all(|plane| plane.chunks(AT_ONCE).all(is_sound)) {
+        let parts: Vec<&[f32]> = self.planes().iter().flat_map(|plane| plane.chunks(AT_ONCE)).collect();
+        if !parts.into_par_iter().with_min_len(PARTS).all(is_sound) {
             for (property, plane) in self.planes().named(self.sh_degree()) {
                 if let Some((row, &value)) = plane.iter().enumerate().find(|(_, value)| !value.is_finite()) {
                     return Err(Defect { row, property, kind: DefectKind::NotFinite, value });
