@@ -11,6 +11,7 @@ use crate::pca::Components;
 use crate::savings::{BIT, Saving, Tool};
 use crate::settings::{Preset, ShChoice};
 use crate::vq;
+use rayon::prelude::*;
 use splatstream_decoder::steps::step;
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::{TransformHeader, TransformKind};
@@ -23,6 +24,8 @@ const FRACTION: f64 = 64.0;
 const MEAN_LIMIT: f64 = 16_777_215.0;
 /// Gaussians on which coefficients and codebooks are compared.
 const TRIAL: usize = 1 << 13;
+/// Gaussians whose components a thread takes from their planes at once, at least.
+const AT_ONCE: usize = 1 << 10;
 
 /// The transform unit of `components`, for a step.
 pub(crate) fn transform(kind: TransformKind, components: &Components, step: f32) -> Transform {
@@ -89,7 +92,7 @@ pub(crate) struct ShPlan {
 /// A bit is worth [`BIT`].
 pub(crate) fn plan_sh(
     components: &[Vec<f32>],
-    exponent: impl Fn(usize) -> u8,
+    exponent: impl Fn(usize) -> u8 + Sync,
     gaussians_of_gop: usize,
     choice: ShChoice,
     preset: Preset,
@@ -132,21 +135,25 @@ pub(crate) fn compare(
 }
 
 /// The components of every `stride`-th Gaussian in its own steps, one after the other.
-#[expect(clippy::indexing_slicing, reason = "tiles and rows lie within the planes that they are cut from")]
-fn sampled_rows(components: &[Vec<f32>], exponent: impl Fn(usize) -> u8, stride: usize) -> Vec<f32> {
+#[expect(clippy::indexing_slicing, reason = "rows are those of the planes")]
+fn sampled_rows(components: &[Vec<f32>], exponent: impl Fn(usize) -> u8 + Sync, stride: usize) -> Vec<f32> {
     let count = components.first().map_or(0, Vec::len);
-    let of_row = |row: usize| {
-        let step = step(exponent(row)) as f32;
-        components.iter().map(move |plane| plane[row] / step)
-    };
-    (0..count).step_by(stride).flat_map(of_row).collect()
+    let mut sampled = vec![0.0; count.div_ceil(stride) * components.len()];
+    sampled.par_chunks_exact_mut(components.len().max(1)).with_min_len(AT_ONCE).enumerate().for_each(
+        |(number, values)| {
+            let row = number * stride;
+            let step = step(exponent(row)) as f32;
+            values.iter_mut().zip(components).for_each(|(value, plane)| *value = plane[row] / step);
+        },
+    );
+    sampled
 }
 
 /// What principal components save against coefficients as they are, on some of the Gaussians.
 pub(crate) fn worth_of_transform(
     components: &[Vec<f32>],
     planes: &[&[f32]],
-    exponent: impl Fn(usize) -> u8,
+    exponent: impl Fn(usize) -> u8 + Sync,
     step: f32,
 ) -> Saving {
     let stride = (components.first().map_or(0, Vec::len) / TRIAL).max(1);

@@ -67,11 +67,14 @@ impl GopTools {
             if frames == 1 {
                 colour::drop_unused(&mut transform, &mut components, &exponent);
             }
-            if settings.tools.sh_transform && settings.preset != Preset::Fast && !frame.is_empty() {
-                worth_of_transform = Some(colour::worth_of_transform(&components, &planes, &exponent, step));
-            }
+            let is_looked_at =
+                settings.tools.sh_transform && settings.preset != Preset::Fast && !frame.is_empty();
             let gaussians = frame.len().saturating_mul(frames as usize);
-            let mut plan = colour::plan_sh(&components, &exponent, gaussians, settings.sh, settings.preset);
+            let (worth, mut plan) = rayon::join(
+                || is_looked_at.then(|| colour::worth_of_transform(&components, &planes, &exponent, step)),
+                || colour::plan_sh(&components, &exponent, gaussians, settings.sh, settings.preset),
+            );
+            worth_of_transform = worth;
             if settings.profile() == Profile::Dynamic {
                 keep_zero(&mut plan.codebooks, usize::from(transform.header.rank));
             }
