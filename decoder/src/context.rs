@@ -137,9 +137,7 @@ fn axis_contexts(axis: &ContextAxis, plane: usize, info: PlaneInfo, block: &Code
     if axis.source == Source::None || is_serial(axis.source) {
         return Vec::new();
     }
-    let mut contexts = vec![0; block.len()];
-    AxisLookup::new(axis, 1).add_contexts(&values(axis.source, plane, info, block), &mut contexts);
-    contexts
+    contexts_of(axis, &values(axis.source, plane, info, block))
 }
 
 /// The contexts of a plane whose values are known: what the encoder codes with.
@@ -179,31 +177,31 @@ pub fn delta_contexts(axes: &[ContextAxis; 2], deltas: &[u64], segments: Segment
 
 /// The context values of the deltas of a block, which start again in each segment.
 pub fn delta_values(deltas: &[u64], segments: Segments) -> Vec<i32> {
-    let of_segment = |deltas: &[u64]| {
+    let mut values = Vec::with_capacity(deltas.len());
+    for deltas in deltas.chunks(segments.length()) {
         let mut neighbours = DeltaNeighbours::default();
-        let before = |&delta: &u64| {
+        values.extend(deltas.iter().map(|&delta| {
             let value = neighbours.value();
             neighbours.push(delta);
             value
-        };
-        deltas.iter().map(before).collect::<Vec<_>>()
-    };
-    deltas.chunks(segments.length()).flat_map(of_segment).collect()
+        }));
+    }
+    values
 }
 
 /// The values of a serial source for a plane whose values are known; they start again in each segment.
 pub fn serial_values(source: Source, values: &[i32], segments: Segments) -> Vec<i32> {
-    let of_segment = |values: &[i32]| {
+    let mut sums = Vec::with_capacity(values.len());
+    for values in values.chunks(segments.length()) {
         let mut last = [0; 4];
-        let before = |&value: &i32| {
+        sums.extend(values.iter().map(|&value| {
             let sum = last.iter().fold(0_i32, |sum, &value| sum.wrapping_add(value));
             let [a, b, c, _] = last;
             last = [term(source, value), a, b, c];
             sum
-        };
-        values.iter().map(before).collect::<Vec<_>>()
-    };
-    values.chunks(segments.length()).flat_map(of_segment).collect()
+        }));
+    }
+    sums
 }
 
 /// What a value adds to a serial source of the four entries after it.
@@ -213,8 +211,14 @@ pub(crate) fn term(source: Source, value: i32) -> i32 {
 }
 
 fn serial_contexts(axis: &ContextAxis, values: &[i32], segments: Segments) -> Vec<u8> {
-    let lookup = AxisLookup::new(axis, 1);
-    serial_values(axis.source, values, segments).into_iter().map(|value| lookup.context(value)).collect()
+    contexts_of(axis, &serial_values(axis.source, values, segments))
+}
+
+/// The contexts of values on one axis.
+pub fn contexts_of(axis: &ContextAxis, values: &[i32]) -> Vec<u8> {
+    let mut contexts = vec![0; values.len()];
+    AxisLookup::new(axis, 1).add_contexts(values, &mut contexts);
+    contexts
 }
 
 /// `first * second_contexts + second`; an empty second axis is all 0.

@@ -22,20 +22,25 @@ pub(crate) struct Histogram {
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self { counts: vec![0; 256] }
+        Self::of_tokens(256)
     }
 }
 
 impl Histogram {
+    /// Of tokens that are below a number.
+    pub(crate) fn of_tokens(count: usize) -> Self {
+        Self { counts: vec![0; count] }
+    }
+
     /// Counts one token.
     #[inline]
-    #[expect(clippy::indexing_slicing, reason = "a token has eight bits, and there are 256 counts")]
+    #[expect(clippy::indexing_slicing, reason = "a token is below the number of counts")]
     #[expect(clippy::arithmetic_side_effects, reason = "counts of values that are in memory")]
     pub(crate) fn add(&mut self, token: u8) {
         self.counts[usize::from(token)] += 1;
     }
 
-    /// Both together.
+    /// Both together, of as many tokens.
     #[expect(clippy::arithmetic_side_effects, reason = "counts of values that are in memory")]
     pub(crate) fn merged(&self, other: &Self) -> Self {
         Self { counts: self.counts.iter().zip(&other.counts).map(|(a, b)| a + b).collect() }

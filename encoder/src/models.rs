@@ -13,11 +13,11 @@ use crate::settings::{Preset, Tools};
 use core::slice;
 use rayon::prelude::*;
 use splatstream_decoder::block::CodedBlock;
-use splatstream_decoder::context::{self, is_serial};
+use splatstream_decoder::context::{self, contexts_of, is_serial};
 use splatstream_decoder::layout::{Attribute, PlaneInfo, Section, is_available};
 use splatstream_format::bits::BitWriter;
 use splatstream_format::entropy::frequencies::Frequencies;
-use splatstream_format::entropy::model::{AxisLookup, ContextAxis, PlaneModel, Source, write_models};
+use splatstream_format::entropy::model::{ContextAxis, PlaneModel, Source, write_models};
 use splatstream_format::entropy::token::{Alphabet, split, zigzag};
 
 /// Gaussians that are looked at for the choice of a model, nearly: whole blocks.
@@ -95,6 +95,8 @@ struct PlaneView<'a> {
     plane: usize,
     blocks: &'a [CodedBlock],
     tokens: Vec<u8>,
+    /// All tokens are below this.
+    token_count: usize,
 }
 
 /// Tables over contexts, and what they would cost.
@@ -111,15 +113,21 @@ fn axis_bits(axis: &ContextAxis) -> f64 {
 
 impl PlaneView<'_> {
     fn values(&self, source: Source) -> Vec<i32> {
-        self.blocks.iter().flat_map(|block| source_values(source, self.info, self.plane, block)).collect()
+        let of_block = |block| source_values(source, self.info, self.plane, block);
+        self.blocks.iter().map(of_block).collect::<Vec<Vec<i32>>>().concat()
     }
 
     fn candidate(&self, axes: [ContextAxis; 2], contexts: &[u8]) -> Candidate {
         let [first, second] = &axes;
         let count = first.contexts() * second.contexts();
-        let mut histograms = vec![Histogram::default(); count];
-        for (index, &token) in self.tokens.iter().enumerate() {
-            histograms[context_at(contexts, index)].add(token);
+        let mut histograms = vec![Histogram::of_tokens(self.token_count); count];
+        match contexts {
+            [] => self.tokens.iter().for_each(|&token| histograms[0].add(token)),
+            _ => self
+                .tokens
+                .iter()
+                .zip(contexts)
+                .for_each(|(&token, &at)| histograms[usize::from(at)].add(token)),
         }
         let clustering = cluster(histograms, second.contexts());
         let bits = clustering.bits + axis_bits(first) + axis_bits(second);
@@ -132,10 +140,6 @@ impl PlaneView<'_> {
             source,
             thresholds: quantile_thresholds(values, parts),
         };
-        let on_axis = |axis: &ContextAxis, values: &[i32]| -> Vec<u8> {
-            let lookup = AxisLookup::new(axis, 1);
-            values.iter().map(|&value| lookup.context(value)).collect()
-        };
         let values: Vec<Vec<i32>> = sources.iter().map(|&source| self.values(source)).collect();
         let mut best = self.candidate([ContextAxis::NONE, ContextAxis::NONE], &[]);
         let mut first = None;
@@ -144,7 +148,7 @@ impl PlaneView<'_> {
             if axis.thresholds.is_empty() {
                 continue;
             }
-            let contexts = on_axis(&axis, values);
+            let contexts = contexts_of(&axis, values);
             let candidate = self.candidate([axis.clone(), ContextAxis::NONE], &contexts);
             if candidate.bits < best.bits {
                 best = candidate;
@@ -157,7 +161,7 @@ impl PlaneView<'_> {
             if index == taken || second.thresholds.is_empty() {
                 continue;
             }
-            let contexts = context::combine(&on_first, &on_axis(&second, values), second.contexts());
+            let contexts = context::combine(&on_first, &contexts_of(&second, values), second.contexts());
             let candidate = self.candidate([first.clone(), second], &contexts);
             if candidate.bits < best.bits {
                 best = candidate;
@@ -188,10 +192,12 @@ fn choose(
     two_axes: bool,
     (preset, tools): (Preset, Tools),
 ) -> PlaneModel {
-    let values: Vec<u64> = blocks.iter().flat_map(|block| unsigned_values(info, plane, block)).collect();
+    let of_block = |block| unsigned_values(info, plane, block);
+    let values = blocks.iter().map(of_block).collect::<Vec<Vec<u64>>>().concat();
     let direct_log2 = direct_log2(info, &values);
-    let tokens = values.iter().map(|&value| split(value, direct_log2).token).collect();
-    let view = PlaneView { info, plane, blocks, tokens };
+    let tokens: Vec<u8> = values.iter().map(|&value| split(value, direct_log2).token).collect();
+    let token_count = tokens.iter().max().map_or(1, |&last| usize::from(last) + 1);
+    let view = PlaneView { info, plane, blocks, tokens, token_count };
     let best = view.best(&candidates(info, preset, tools), two_axes);
     let (axes, table_of_context) = best.clustering.simplified(best.axes);
     PlaneModel { bias, direct_log2, axes, tables: Vec::new(), table_of_context }
