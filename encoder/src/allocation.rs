@@ -80,6 +80,33 @@ fn psnr_of(error: f64) -> f64 {
     -10.0 * libm::log10(error)
 }
 
+/// What steps are fitted in.
+pub(crate) struct FitViews {
+    /// The cameras that shares are fitted with.
+    cameras: Vec<Camera>,
+    /// The source as the views show it that quality is measured in.
+    views: Vec<StripView>,
+    /// The source as those views show it in which attributes are measured alone.
+    alone: Vec<StripView>,
+}
+
+impl FitViews {
+    /// Of a canonical frame; `whole` is what its pictures are compared with, if that has more Gaussians. `views` are those that
+    /// it is measured in.
+    pub(crate) fn of(
+        (frame, whole): (&GaussianFrame, Option<&GaussianFrame>),
+        views: &StripViews,
+        settings: &Settings,
+    ) -> Self {
+        let cameras = cameras(frame, settings);
+        let views = match whole {
+            Some(whole) => views.beside(frame, whole),
+            None => views.of(frame, 0..views.len()),
+        };
+        Self { views, alone: alone(frame, &cameras, settings), cameras }
+    }
+}
+
 /// What is measured of a frame to fit steps to a quality.
 pub(crate) struct Fit {
     pub(crate) scene: Scene,
@@ -102,19 +129,17 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Measures a canonical frame; `whole` is what its pictures are compared with, if that has more Gaussians. `settings` have the quality that is wanted, or something near it; `views` are those that
-    /// it is measured in.
+    /// Measures a canonical frame. `settings` have the quality that is wanted, or something near it.
     pub(crate) fn new(
-        (frame, whole): (&GaussianFrame, Option<&GaussianFrame>),
+        frame: &GaussianFrame,
         ranked: &Ranked,
-        views: &StripViews,
+        FitViews { cameras, views, alone }: FitViews,
         settings: &Settings,
     ) -> Self {
         let laws = match settings.tools.adaptive_steps {
             true => Laws::of(frame, &ranked.order, &ranked.shown, &settings.refinements),
             false => Laws::default(),
         };
-        let cameras = cameras(frame, settings);
         let mut scene = Scene::new();
         scene.add(frame, &(0..frame.len() as u32).collect::<Vec<u32>>());
         let mut refinement = vec![0; frame.len()];
@@ -135,11 +160,8 @@ impl Fit {
             refinement,
             sensitivity: Sensitivity::new(&sample, shown, &cameras),
             level: ranked.level,
-            views: match whole {
-                Some(whole) => views.beside(frame, whole),
-                None => views.of(frame, 0..views.len()),
-            },
-            alone: alone(frame, cameras, settings),
+            views,
+            alone,
             is_held: true,
             sample: (sample, rows),
         }
@@ -238,8 +260,9 @@ impl Fit {
                 steps = towards(decibels, self.expected(&self.estimated(&steps)?), steps);
             }
         } else {
-            // Shares are those of steps near the ones that are looked for.
-            steps = towards(decibels, self.psnr(&steps)?.unwrap_or(decibels.into()), steps);
+            // Shares are those of steps near the ones that are looked for: a few views tell that well enough.
+            let now = self.psnr_in(&self.alone, &steps)?;
+            steps = towards(decibels, now.unwrap_or(decibels.into()), steps);
             let errors = self.measured(&steps)?;
             steps = self.allocated(&steps, errors);
         }
@@ -257,7 +280,7 @@ impl Fit {
         let mut next = Some(decibels);
         while let Some(at) = next {
             let scaled = self.no_finer(finer(steps, at - decibels));
-            let psnr = self.psnr(&scaled)?;
+            let psnr = self.psnr_in(&self.views, &scaled)?;
             // Where nothing can be seen nothing is too bad.
             if secant.take(at, psnr.unwrap_or(decibels)) {
                 best = (scaled, psnr);
@@ -278,9 +301,9 @@ impl Fit {
     }
 
     /// PSNR of pictures with all attributes on their grids, dB.
-    fn psnr(&self, steps: &Steps) -> Result<Option<f64>, Error> {
+    fn psnr_in(&self, views: &[StripView], steps: &Steps) -> Result<Option<f64>, Error> {
         let grids = self.grids(self.laws(), steps);
-        mean(self.views.iter().map(|view| {
+        mean(views.iter().map(|view| {
             let trial = Trial::new(&grids, &view.frame, &view.rows);
             Ok(view.psnr(&trial.decoded(&ATTRIBUTES)?))
         }))
@@ -336,7 +359,7 @@ impl Fit {
 
 /// What attributes are measured alone in: nothing for the fast preset, unless there are so few Gaussians that estimates are
 /// poor and pictures cost little.
-fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Vec<StripView> {
+fn alone(frame: &GaussianFrame, cameras: &[Camera], settings: &Settings) -> Vec<StripView> {
     if settings.preset == Preset::Fast && frame.len() >= FEW {
         return Vec::new();
     }
@@ -344,7 +367,7 @@ fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Ve
     let first = usize::from(cameras.len() > 1);
     let apart = cameras.len().div_ceil(ALONE).max(1);
     let places = (first..cameras.len()).step_by(apart).take(ALONE);
-    StripViews::new(cameras, EVERY, frame).of(frame, places)
+    StripViews::new(cameras.to_vec(), EVERY, frame).of(frame, places)
 }
 
 /// The views that shares are fitted in.
