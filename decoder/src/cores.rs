@@ -17,6 +17,15 @@ pub(crate) fn are_many(values: usize) -> bool {
     HAS_THREADS && values > FEW
 }
 
+/// Work on so many values that shares parts of itself again and again: by one of the threads that share it, so that it is handed
+/// over once and not for each part.
+pub(crate) fn whole<R: Send>(values: usize, work: impl FnOnce() -> R + Send) -> R {
+    match are_many(values) {
+        true => rayon::scope(|_| work()),
+        false => work(),
+    }
+}
+
 /// What `of` makes of each item, in order. All items together have so many values.
 pub(crate) fn map<T: Send, R: Send>(
     values: usize,
@@ -67,6 +76,8 @@ mod tests {
         let squares = |values| map(values, (0..999_u64).collect(), |item| item.pow(2));
         assert_eq!(squares(FEW), squares(FEW + 1));
         assert_eq!(squares(FEW).last(), Some(&998_u64.pow(2)));
+        let is_shared = |values| whole(values, || rayon::current_thread_index().is_some());
+        assert_eq!([FEW, FEW + 1].map(is_shared), [false, true]);
     }
 
     #[test]

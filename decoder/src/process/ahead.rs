@@ -28,8 +28,7 @@ impl Decoder {
         let (Some(frame), Some(gop)) = (&self.frame, &self.gop) else { return false };
         let is_free = gop.header.is_predicted() && !is_kept(gop, frame.role.temporal_layer);
         let is_wanted = self.options.ahead && !self.options.stop_at_first_error && self.frames_left > 0;
-        let values = (frame.header.gaussian_count as usize).saturating_mul(PLANES);
-        let is_worth_it = cores::are_many(values) && rayon::current_num_threads() > 1;
+        let is_worth_it = cores::are_many(values(frame)) && rayon::current_num_threads() > 1;
         is_wanted && is_worth_it && is_free && self.waiting.is_none() && frame.error.is_none()
     }
 
@@ -60,7 +59,9 @@ impl Decoder {
     /// Decodes the pending units of a frame; gives their errors.
     fn decoded(&self, frame: &mut FrameInProgress) -> Vec<Error> {
         match self.context(frame.reference) {
-            Some(context) if !frame.pending.is_empty() => frame.decode(&context),
+            Some(context) if !frame.pending.is_empty() => {
+                cores::whole(values(frame), || frame.decode(&context))
+            }
             _ => Vec::new(),
         }
     }
@@ -112,6 +113,11 @@ impl Decoder {
         self.ready.extend(done.map(|frame| Ready { frame, point: self.frame_point, found: None }));
         self.next_ready()
     }
+}
+
+/// Values of all Gaussians of a frame.
+fn values(frame: &FrameInProgress) -> usize {
+    (frame.header.gaussian_count as usize).saturating_mul(PLANES)
 }
 
 /// Whether later frames of a GOP may refer to those of a temporal layer.
