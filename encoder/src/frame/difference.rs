@@ -42,6 +42,14 @@ impl Apart {
         self.sh().iter().map(|value| value / self.steps[4]).collect()
     }
 
+    /// Whether some difference is larger than this, in the steps that it is coded with.
+    pub(crate) fn is_beyond(&self, most: f32) -> bool {
+        let mut moves = self.position.iter().map(|change| change / self.move_step);
+        let mut attributes =
+            (0..).zip(&self.attributes).map(|(attribute, change)| change / self.step_of(attribute));
+        moves.any(|steps| steps.abs() > most) || attributes.any(|steps| steps.abs() > most)
+    }
+
     /// All differences.
     pub(crate) fn all_kept(&self, book: Option<&Codebook>) -> Kept {
         Kept {

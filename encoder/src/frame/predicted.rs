@@ -11,6 +11,7 @@ use super::moves::{self, MovePlan};
 use super::new_list::{NewList, unpredicted};
 use super::predictors::{Chooser, used};
 use super::residuals::Wanted;
+use super::steadiness::Steadiness;
 use super::survivors::{Aim, Fate, Parents, REMOVED, Survivors};
 use super::target::Target;
 use super::unit::{Draft, UnitCoder};
@@ -119,6 +120,12 @@ impl<'a> Predicted<'a> {
             }
         }
         Ok(Self { from, matching, displaced, field, cells, models })
+    }
+
+    /// Has small differences weighed by what pictures of the source show of them.
+    pub(crate) fn set_weigher(&mut self, steadiness: &Steadiness) {
+        self.from.survivors.weigher = Some(steadiness.weigher(&self.from.target.frame));
+        self.from.survivors.price = steadiness.weighed_price();
     }
 
     /// Codes the units of the frame.

@@ -25,6 +25,11 @@ pub(crate) fn finite_psnr(pictures: &ReferencePictures, frame: &GaussianFrame) -
     pictures.psnr(frame).map(|decibels| decibels.min(metrics::LOSSLESS_DB))
 }
 
+/// The share of the error of a view that a bit is worth at level 0, of so many views and Gaussians.
+pub(crate) fn price_at_zero(views: usize, gaussians: usize) -> f32 {
+    views as f32 / (BITS * gaussians.max(1) as f32)
+}
+
 /// How good pictures must be.
 pub(crate) struct Goal {
     /// Those of the source.
@@ -40,8 +45,7 @@ pub(crate) struct Goal {
 impl Goal {
     /// The share of the error of a view that a bit is worth at a level, of a frame of so many Gaussians.
     fn price(&self, level: i32, gaussians: usize) -> f32 {
-        let at_zero = self.least.len() as f32 / (BITS * gaussians.max(1) as f32);
-        at_zero * libm::exp2f(0.5 * level as f32)
+        price_at_zero(self.least.len(), gaussians) * libm::exp2f(0.5 * level as f32)
     }
 
     /// By how much pictures are better than they must be, dB, on average over the views.

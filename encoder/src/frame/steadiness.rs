@@ -2,14 +2,17 @@
 //!
 //! What a bit is worth decides how much of a difference is left, and errors that are left stay in later frames. How much
 //! they show depends on the scene. So the pictures of each predicted frame are compared with its source, as those of the I
-//! frame were, and the price of the next frame follows: nothing is coded twice.
+//! frame were, and the price of the next frame follows: nothing is coded twice. The same views of its source say of each
+//! Gaussian what a difference of it shows, before the frame is coded.
 
 use super::compensation::shown;
-use super::rate_distortion::finite_psnr;
+use super::rate_distortion::{finite_psnr, price_at_zero};
 use super::survivors::BitPrice;
+use super::update_decision::Judge;
 use super::{CodedFrame, Target};
 use crate::error::Error;
 use splatstream_format::syntax::SequenceParameters;
+use splatstream_gaussians::GaussianFrame;
 use splatstream_render::{Camera, ReferencePictures};
 
 /// Views that are looked at, and their lines: the mean of a few small ones is steady.
@@ -31,11 +34,18 @@ const CHEAPER: f32 = 0.6;
 const DEARER: f32 = 1.25;
 const LEVELS: core::ops::RangeInclusive<f32> = 0.125..=3.0;
 
+/// What a bit is worth at level 1, of what it is where pictures decide about single frames: errors that are left stay, and
+/// those of neighbours add up.
+const OF_SINGLE: f32 = 0.03;
+
+/// What a bit of a move is worth that pictures have found worth it, of what one is otherwise.
+const OF_WEIGHED: f32 = 0.5;
+
 /// The pictures of a GOP and the price that follows from them.
 pub(crate) struct Steadiness {
     cameras: Vec<Camera>,
-    /// PSNR of the I frame, dB.
-    of_intra: f64,
+    /// PSNR of the I frame in each view, dB.
+    of_intra: Vec<f64>,
     /// How far predicted frames have been below it, dB: a mean in which late ones count more.
     below: Option<f64>,
     level: f32,
@@ -55,7 +65,7 @@ impl Steadiness {
         let stride = cameras.len().div_ceil(VIEWS).max(1);
         let small = |camera: &Camera| camera.scaled_to_height(LINES.min(camera.height));
         let cameras = cameras.iter().step_by(stride).map(small).collect();
-        let mut steadiness = Self { cameras, of_intra: 0.0, below: None, level: FIRST };
+        let mut steadiness = Self { cameras, of_intra: Vec::new(), below: None, level: FIRST };
         steadiness.of_intra = steadiness.psnr(target, coded, sequence)?;
         Ok(steadiness)
     }
@@ -63,6 +73,17 @@ impl Steadiness {
     /// What a bit is worth in the next frame.
     pub(crate) fn price(&self) -> BitPrice {
         BitPrice::at(self.level)
+    }
+
+    /// The same where pictures have said which moves are worth it.
+    pub(crate) fn weighed_price(&self) -> BitPrice {
+        BitPrice { moves: OF_WEIGHED * self.price().moves, ..self.price() }
+    }
+
+    /// What pictures say of the differences of the next frame.
+    pub(crate) fn weigher(&self, frame: &GaussianFrame) -> Judge {
+        let price = OF_SINGLE * self.level * price_at_zero(self.cameras.len(), frame.len());
+        Judge::of_rows(frame, (&self.cameras, &self.of_intra), price)
     }
 
     /// Looks at a predicted frame.
@@ -75,7 +96,7 @@ impl Steadiness {
         coded: &CodedFrame,
         sequence: &SequenceParameters,
     ) -> Result<(), Error> {
-        let now = self.of_intra - self.psnr(target, coded, sequence)?;
+        let now = mean(&self.of_intra) - mean(&self.psnr(target, coded, sequence)?);
         let below = self.below.map_or(now, |before| before + FRESH * (now - before));
         self.below = Some(below);
         if below > FAR {
@@ -87,10 +108,20 @@ impl Steadiness {
         Ok(())
     }
 
-    /// PSNR of the pictures of a frame, mean of the views, dB.
-    fn psnr(&self, target: &Target, coded: &CodedFrame, sequence: &SequenceParameters) -> Result<f64, Error> {
+    /// PSNR of the pictures of a frame, dB.
+    fn psnr(
+        &self,
+        target: &Target,
+        coded: &CodedFrame,
+        sequence: &SequenceParameters,
+    ) -> Result<Vec<f64>, Error> {
         let views = ReferencePictures::new(&target.frame, self.cameras.clone());
         let frame = shown(&coded.reference.lists, sequence)?;
-        Ok(finite_psnr(&views, &frame).sum::<f64>() / views.len().max(1) as f64)
+        Ok(finite_psnr(&views, &frame).collect())
     }
+}
+
+/// The mean of some views, dB.
+fn mean(decibels: &[f64]) -> f64 {
+    decibels.iter().sum::<f64>() / decibels.len().max(1) as f64
 }

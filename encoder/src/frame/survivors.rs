@@ -107,6 +107,8 @@ pub(crate) struct Survivors<'a> {
     pub(crate) price: BitPrice,
     /// What pictures say; none: all differences count.
     pub(crate) judge: Option<Judge>,
+    /// Without a judge, what pictures say of differences that need not be sent; none: they count by their steps.
+    pub(crate) weigher: Option<Judge>,
     /// The codebook of SH residuals, if they are vector quantised: the second stage, after that of whole values.
     pub(crate) book: Option<&'a Codebook>,
 }
@@ -137,13 +139,15 @@ impl Survivors<'_> {
     fn fate(&self, parents: Parents<'_>, row: usize, index: u32) -> Fate {
         let index = index as usize;
         let apart = self.apart(parents, row, index);
-        let Kept { moves, attributes, entry } = match &self.judge {
+        let weigher = self.weigher.as_ref().filter(|_| !apart.is_beyond(MOST));
+        let judge = self.judge.as_ref().or(weigher);
+        let Kept { moves, attributes, entry } = match judge {
             None => apart.all_kept(self.book),
             Some(judge) => judge.kept(self.sequence, self.book, &apart, index),
         };
         let place = self.target.position.each_ref().map(|plane| plane[index]);
         let update = self.update(parents, row, &attributes, entry);
-        let is_worth_it = match &self.judge {
+        let is_worth_it = match judge {
             None => {
                 let bits = NAMED_BITS + update.bits();
                 let is_cheap = update.gain > self.price.updates * bits;

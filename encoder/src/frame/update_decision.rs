@@ -2,17 +2,19 @@
 //!
 //! Each difference has an error that pictures show if it is left, [estimated](super::visible_difference) from the source frame as
 //! the cameras in use see it, and a number of bits that it takes. It is sent where the error is above the price of the
-//! bits. The [price](super::rate_distortion) is as high as the pictures of the frame allow.
+//! bits. The [price](super::rate_distortion) is as high as the pictures of the frame allow, or where attributes decide as
+//! high as those of the frames before [allow](super::steadiness).
 #![expect(clippy::arithmetic_side_effects, reason = "lengths of what is in memory; steps are clamped")]
 
 use super::difference::{Apart, Kept};
-use super::visible_difference::{Seen, Shown, pixel};
+use super::visible_difference::{Pixels, Seen, Shown};
 use crate::grid::nearest_integer;
+use pulp::Arch;
 use splatstream_format::payload::Codebook;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::ReferencePictures;
 use splatstream_render::contribution::worth;
+use splatstream_render::{Camera, ReferencePictures};
 
 /// Bits of a difference of one step, and what each doubling adds; what a zero takes among others that are none.
 const FIRST_BITS: f32 = 3.0;
@@ -26,8 +28,9 @@ const NAMED_BITS: f32 = 2.0;
 const ENTRY_BITS: f32 = 6.0;
 
 /// What a change of pictures from one frame to the next counts, of an error of the same size: frames that were trained
-/// apart flicker where nothing moves.
+/// apart flicker where nothing moves. More where rows keep their meaning: what is left as it was costs least there.
 const CALM: f32 = 0.02;
+const CALM_OF_ROWS: f32 = 0.1;
 
 /// What is further from its partner moves: the square of its distance, in widths of the Gaussian.
 const STILL: f32 = 1.0;
@@ -44,6 +47,8 @@ pub(crate) struct Judge {
     carried: Vec<f32>,
     /// The share of the error allowed in a view that a bit is worth.
     pub(crate) price: f32,
+    /// What a change counts of an error of its size.
+    calm: f32,
 }
 
 /// A difference in steps, and the error of a squared step of it.
@@ -64,22 +69,20 @@ impl Judge {
         (pictures, least): (&ReferencePictures, &[f64]),
     ) -> Self {
         let cameras = pictures.cameras().cloned().collect::<Vec<_>>();
-        let mut seen: Vec<Seen> = (0..frame.len())
-            .map(|row| Seen { loss: 0.0, energy: 0.0, pixel: pixel(frame, row, &cameras) })
-            .collect();
         let mut carried = vec![0.0; displaced.len()];
         for (camera, least) in cameras.iter().zip(least) {
-            let values = 3.0 * f64::from(camera.width) * f64::from(camera.height);
-            let allowed = values * libm::pow(10.0, -0.1 * least);
+            let allowed = allowed(camera, *least);
             for (loss, worth) in carried.iter_mut().zip(worth(displaced, core::slice::from_ref(camera))) {
                 *loss += (worth.loss / allowed) as f32;
             }
-            for (seen, worth) in seen.iter_mut().zip(worth(frame, core::slice::from_ref(camera))) {
-                seen.loss += (worth.loss / allowed) as f32;
-                seen.energy += (worth.energy / allowed) as f32;
-            }
         }
-        Self { seen, carried, price: 0.0 }
+        Self { seen: seen(frame, &cameras, least), carried, price: 0.0, calm: CALM }
+    }
+
+    /// For the differences of a source frame whose rows keep their meaning, seen by some cameras: nothing else of it is
+    /// left to pictures.
+    pub(crate) fn of_rows(frame: &GaussianFrame, (cameras, least): (&[Camera], &[f64]), price: f32) -> Self {
+        Self { seen: seen(frame, cameras, least), carried: Vec::new(), price, calm: CALM_OF_ROWS }
     }
 
     /// Whether a Gaussian of the target that nothing continues is worth its bits.
@@ -104,7 +107,7 @@ impl Judge {
         let shown = Shown::new(seen, &apart.pose);
         let step = sequence.position_step();
         let widths = shown.widths(apart.position.map(|steps| steps * step));
-        let calm = if widths <= STILL { CALM } else { 0.0 };
+        let calm = if widths <= STILL { self.calm } else { 0.0 };
         let with_calm = |term: Term| Term { calm, ..term };
         let moves = apart.position.map(|steps| steps / apart.move_step);
         let moved = self.group(&spread(&moves, shown.moved(widths)).map(with_calm), 0.0);
@@ -159,6 +162,29 @@ impl Judge {
         }
         best
     }
+}
+
+/// The sum of squared errors of a picture with this PSNR.
+fn allowed(camera: &Camera, least: f64) -> f64 {
+    let values = 3.0 * f64::from(camera.width) * f64::from(camera.height);
+    values * libm::pow(10.0, -0.1 * least)
+}
+
+/// What pictures show of each Gaussian of a frame, as shares of the errors allowed in them.
+fn seen(frame: &GaussianFrame, cameras: &[Camera], least: &[f64]) -> Vec<Seen> {
+    let mut pixels = vec![0.0; frame.len()];
+    let position = frame.position().each_ref().map(Vec::as_slice);
+    Arch::new().dispatch(Pixels { position, cameras, pixels: &mut pixels });
+    let unseen = |pixel| Seen { loss: 0.0, energy: 0.0, pixel };
+    let mut seen: Vec<Seen> = pixels.into_iter().map(unseen).collect();
+    for (camera, least) in cameras.iter().zip(least) {
+        let allowed = allowed(camera, *least);
+        for (seen, worth) in seen.iter_mut().zip(worth(frame, core::slice::from_ref(camera))) {
+            seen.loss += (worth.loss / allowed) as f32;
+            seen.energy += (worth.energy / allowed) as f32;
+        }
+    }
+    seen
 }
 
 impl Term {

@@ -72,6 +72,7 @@ impl SpanCoder<'_> {
             namings: Namings::new(),
             price: gop.steadiness.as_ref().map_or(BitPrice::at(1.0), Steadiness::price),
             judge: None,
+            weigher: None,
             book: None,
         }
     }

@@ -57,8 +57,10 @@ impl SpanCoder<'_> {
         };
         let cells = Some(&cells).filter(|_| self.common.settings.tools.cell_motion);
         let mut predicted = Predicted::new(from, cells, matching)?;
-        if let Some(goal) = &mut goal {
-            predicted.set_judge(goal)?;
+        match (&mut goal, &gop.steadiness) {
+            (Some(goal), _) => predicted.set_judge(goal)?,
+            (None, Some(steadiness)) => predicted.set_weigher(steadiness),
+            (None, None) => {}
         }
         let coded = predicted.code()?;
         if !self.is_within_limits(&coded) {
