@@ -11,10 +11,10 @@ use super::moves::{self, MovePlan};
 use super::new_list::{NewList, unpredicted};
 use super::predictors::{Chooser, used};
 use super::residuals::Wanted;
-use super::steadiness::Steadiness;
-use super::survivors::{Aim, Fate, Parents, REMOVED, Survivors};
+use super::survivors::{Aim, BitPrice, Fate, Parents, REMOVED, Survivors};
 use super::target::Target;
 use super::unit::{Draft, UnitCoder};
+use super::update_decision::Judge;
 use super::{CodedFrame, CodedUnit, Reference};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
@@ -122,10 +122,10 @@ impl<'a> Predicted<'a> {
         Ok(Self { from, matching, displaced, field, cells, models })
     }
 
-    /// Has small differences weighed by what pictures of the source show of them.
-    pub(crate) fn set_weigher(&mut self, steadiness: &Steadiness) {
-        self.from.survivors.weigher = Some(steadiness.weigher(&self.from.target.frame));
-        self.from.survivors.price = steadiness.weighed_price();
+    /// Has small differences weighed by what pictures of the source show of them. `price`: what bits are worth then.
+    pub(crate) fn set_weigher(&mut self, weigher: Judge, price: BitPrice) {
+        self.from.survivors.weigher = Some(weigher);
+        self.from.survivors.price = price;
     }
 
     /// Codes the units of the frame.

@@ -59,7 +59,9 @@ impl SpanCoder<'_> {
         let mut predicted = Predicted::new(from, cells, matching)?;
         match (&mut goal, &gop.steadiness) {
             (Some(goal), _) => predicted.set_judge(goal)?,
-            (None, Some(steadiness)) => predicted.set_weigher(steadiness),
+            (None, Some(steadiness)) => {
+                predicted.set_weigher(steadiness.weigher(&target.frame), steadiness.weighed_price());
+            }
             (None, None) => {}
         }
         let coded = predicted.code()?;
