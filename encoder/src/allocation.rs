@@ -80,33 +80,6 @@ fn psnr_of(error: f64) -> f64 {
     -10.0 * libm::log10(error)
 }
 
-/// What steps are fitted in.
-pub(crate) struct FitViews {
-    /// The cameras that shares are fitted with.
-    cameras: Vec<Camera>,
-    /// The source as the views show it that quality is measured in.
-    views: Vec<StripView>,
-    /// The source as those views show it in which attributes are measured alone.
-    alone: Vec<StripView>,
-}
-
-impl FitViews {
-    /// Of a canonical frame; `whole` is what its pictures are compared with, if that has more Gaussians. `views` are those that
-    /// it is measured in.
-    pub(crate) fn of(
-        (frame, whole): (&GaussianFrame, Option<&GaussianFrame>),
-        views: &StripViews,
-        settings: &Settings,
-    ) -> Self {
-        let cameras = cameras(frame, settings);
-        let views = match whole {
-            Some(whole) => views.beside(frame, whole),
-            None => views.of(frame, 0..views.len()),
-        };
-        Self { views, alone: alone(frame, &cameras, settings), cameras }
-    }
-}
-
 /// What is measured of a frame to fit steps to a quality.
 pub(crate) struct Fit {
     pub(crate) scene: Scene,
@@ -129,17 +102,19 @@ pub(crate) struct Fit {
 }
 
 impl Fit {
-    /// Measures a canonical frame. `settings` have the quality that is wanted, or something near it.
+    /// Measures a canonical frame; `whole` is what its pictures are compared with, if that has more Gaussians. `settings` have the quality that is wanted, or something near it; `views` are those that
+    /// it is measured in.
     pub(crate) fn new(
-        frame: &GaussianFrame,
+        (frame, whole): (&GaussianFrame, Option<&GaussianFrame>),
         ranked: &Ranked,
-        FitViews { cameras, views, alone }: FitViews,
+        views: &StripViews,
         settings: &Settings,
     ) -> Self {
         let laws = match settings.tools.adaptive_steps {
             true => Laws::of(frame, &ranked.order, &ranked.shown, &settings.refinements),
             false => Laws::default(),
         };
+        let cameras = cameras(frame, settings);
         let mut scene = Scene::new();
         scene.add(frame, &(0..frame.len() as u32).collect::<Vec<u32>>());
         let mut refinement = vec![0; frame.len()];
@@ -160,8 +135,11 @@ impl Fit {
             refinement,
             sensitivity: Sensitivity::new(&sample, shown, &cameras),
             level: ranked.level,
-            views,
-            alone,
+            views: match whole {
+                Some(whole) => views.beside(frame, whole),
+                None => views.of(frame, 0..views.len()),
+            },
+            alone: alone(frame, cameras, settings),
             is_held: true,
             sample: (sample, rows),
         }
@@ -359,7 +337,7 @@ impl Fit {
 
 /// What attributes are measured alone in: nothing for the fast preset, unless there are so few Gaussians that estimates are
 /// poor and pictures cost little.
-fn alone(frame: &GaussianFrame, cameras: &[Camera], settings: &Settings) -> Vec<StripView> {
+fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Vec<StripView> {
     if settings.preset == Preset::Fast && frame.len() >= FEW {
         return Vec::new();
     }
@@ -367,7 +345,7 @@ fn alone(frame: &GaussianFrame, cameras: &[Camera], settings: &Settings) -> Vec<
     let first = usize::from(cameras.len() > 1);
     let apart = cameras.len().div_ceil(ALONE).max(1);
     let places = (first..cameras.len()).step_by(apart).take(ALONE);
-    StripViews::new(cameras.to_vec(), EVERY, frame).of(frame, places)
+    StripViews::new(cameras, EVERY, frame).of(frame, places)
 }
 
 /// The views that shares are fitted in.

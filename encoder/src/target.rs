@@ -5,7 +5,7 @@
 //! or less, by the [secant](crate::secant) through what is known.
 #![expect(clippy::arithmetic_side_effects, reason = "counts of encodings and frames; layers are at most 4")]
 
-use crate::allocation::{Fit, FitViews, finer};
+use crate::allocation::{Fit, finer};
 use crate::error::Error;
 use crate::first_frame::{coded_form, first_frame, read_first};
 use crate::importance::Ranking;
@@ -157,11 +157,8 @@ impl<'a> Fitting<'a> {
             None => None,
         };
         let mut ranking = Ranking::new(settings);
-        let (ranked, strips) = rayon::join(
-            || ranking.rank_first(&frame),
-            || FitViews::of((&frame, whole.as_ref()), &of_fit, settings),
-        );
-        let fit = Fit::new(&frame, &ranked, strips, settings);
+        let ranked = ranking.rank_first(&frame);
+        let fit = Fit::new((&frame, whole.as_ref()), &ranked, &of_fit, settings);
         Ok(Self { settings, fit, ranking, known: Vec::new(), unseen, sh: settings.sh, fits_values: true })
     }
 
