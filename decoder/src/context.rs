@@ -155,7 +155,7 @@ pub fn plane_contexts(
         return Vec::new();
     }
     let on_axis = |axis: &ContextAxis| match is_serial(axis.source) {
-        true => serial_contexts(axis, values, block.segments()),
+        true => contexts_of(axis, &serial_values(axis.source, values, block.segments())),
         false => axis_contexts(axis, plane, info, block),
     };
     combine(&on_axis(first), &on_axis(second), second.contexts())
@@ -168,11 +168,7 @@ pub fn delta_contexts(axes: &[ContextAxis; 2], deltas: &[u64], segments: Segment
         return Vec::new();
     }
     let before = delta_values(deltas, segments);
-    let context = |&value: &i32| {
-        let [a, b] = [first, second].map(|axis| usize::from(axis.context(value)));
-        u8::try_from(a.wrapping_mul(second.contexts()).wrapping_add(b)).unwrap_or(0)
-    };
-    before.iter().map(context).collect()
+    combine(&contexts_of(first, &before), &contexts_of(second, &before), second.contexts())
 }
 
 /// The context values of the deltas of a block, which start again in each segment.
@@ -208,10 +204,6 @@ pub fn serial_values(source: Source, values: &[i32], segments: Segments) -> Vec<
 #[inline(always)]
 pub(crate) fn term(source: Source, value: i32) -> i32 {
     if source == Source::NeighbourMagnitude { value.wrapping_abs() } else { value }
-}
-
-fn serial_contexts(axis: &ContextAxis, values: &[i32], segments: Segments) -> Vec<u8> {
-    contexts_of(axis, &serial_values(axis.source, values, segments))
 }
 
 /// The contexts of values on one axis.
