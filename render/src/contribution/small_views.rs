@@ -108,11 +108,11 @@ impl SmallViews {
             let arch = pulp::Arch::new();
             let mut desk = Desk::default();
             loop {
-                let (number, shares) = locked(&queue).next();
+                let (number, mut shares) = locked(&queue).next();
                 let Some(view) = views.get(number) else { break };
-                desk.shares = shares;
-                arch.dispatch(Look { left: &self.left, view, most: trace::MOST, desk: &mut desk });
-                locked(&queue).take(number, core::mem::take(&mut desk.shares));
+                let (desk, shown) = (&mut desk, &mut shares);
+                arch.dispatch(Look { left: &self.left, view, most: trace::MOST, desk, shares: shown });
+                locked(&queue).take(number, shares);
             }
         };
         let cores = rayon::current_num_threads().min(views.len());
@@ -161,12 +161,11 @@ fn locked<'m, 'a>(queue: &'m Mutex<Queue<'a>>) -> MutexGuard<'m, Queue<'a>> {
     queue.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What looking from one camera takes, and gives: kept from view to view, since fresh memory takes time.
+/// What looking from one camera takes: kept from view to view, since fresh memory takes time.
 #[derive(Default)]
 struct Desk {
     order: Order,
     trace: Trace,
-    shares: Vec<Share>,
 }
 
 /// Looks at all Gaussians that are left from one camera.
@@ -176,6 +175,8 @@ struct Look<'a> {
     /// What is kept of pixels, at most.
     most: usize,
     desk: &'a mut Desk,
+    /// What the view shows of each of them.
+    shares: &'a mut Vec<Share>,
 }
 
 impl WithSimd for Look<'_> {
@@ -183,8 +184,8 @@ impl WithSimd for Look<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let Self { left, view, most, desk } = self;
-        let Desk { order, trace, shares } = desk;
+        let Self { left, view, most, desk, shares } = self;
+        let Desk { order, trace } = desk;
         order.find(left, &view.camera, view.near);
         shares.clear();
         shares.resize(left.len(), Share::default());
@@ -205,9 +206,10 @@ mod tests {
 
     /// What the first view shows of each Gaussian.
     fn looked(views: &SmallViews, arch: pulp::Arch, most: usize) -> Vec<Share> {
-        let mut desk = Desk::default();
-        arch.dispatch(Look { left: &views.left, view: &views.views[0], most, desk: &mut desk });
-        desk.shares
+        let mut shares = Vec::new();
+        let (desk, view) = (&mut Desk::default(), &views.views[0]);
+        arch.dispatch(Look { left: &views.left, view, most, desk, shares: &mut shares });
+        shares
     }
 
     #[test]
