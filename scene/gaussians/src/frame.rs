@@ -217,6 +217,9 @@ impl<'a> From<&'a Planes> for PlanesRef<'a> {
     }
 }
 
+/// Values that are gathered before another core has woken up.
+const FEW: usize = 1 << 14;
+
 /// Some values of a plane.
 #[expect(
     clippy::indexing_slicing,
@@ -368,7 +371,8 @@ impl GaussianFrame {
     pub fn select(&self, indices: &[u32]) -> Self {
         let mut planes = Planes::of_degree(self.sh_degree);
         let pairs: Vec<(&mut Vec<f32>, &Vec<f32>)> = planes.iter_mut().zip(self.planes().iter()).collect();
-        pairs.into_par_iter().for_each(|(slot, plane)| *slot = picked(plane, indices));
+        let fewest = FEW.div_ceil(indices.len().max(1));
+        pairs.into_par_iter().with_min_len(fewest).for_each(|(slot, plane)| *slot = picked(plane, indices));
         Self::made_of(planes, self.sh_degree, self.antialiased)
     }
 
