@@ -4,6 +4,7 @@
 //! takes longer than all that a small frame needs, so that what is little is done where it comes up.
 
 use crate::interrupt::Interrupt;
+use core::cmp::Reverse;
 use rayon::prelude::*;
 
 /// Modules for web pages have one thread, and no code for more.
@@ -36,6 +37,29 @@ pub(crate) fn map<T: Send, R: Send>(
         true => items.into_par_iter().map(of).collect(),
         false => items.into_iter().map(of).collect(),
     }
+}
+
+/// The same for items that take different times: each comes with what it takes, in any unit. The longest are begun first,
+/// so that all cores are done at nearly the same time.
+pub(crate) fn map_longest_first<T: Send, R: Send>(
+    values: usize,
+    items: Vec<(usize, T)>,
+    of: impl Fn(T) -> R + Sync + Send,
+) -> Vec<R> {
+    if !are_many(values) {
+        return items.into_iter().map(|(_, item)| of(item)).collect();
+    }
+    let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
+    let mut work: Vec<_> = items.into_iter().zip(&mut results).collect();
+    work.sort_by_key(|((takes, _), _)| Reverse(*takes));
+    let of = &of;
+    // What is spawned first is begun first, by whichever thread is free.
+    rayon::scope_fifo(|scope| {
+        for ((_, item), result) in work {
+            scope.spawn_fifo(move |_| *result = Some(of(item)));
+        }
+    });
+    results.into_iter().flatten().collect()
 }
 
 /// Works on each item, as long as no interrupt is requested. All items together have so many values.
@@ -76,6 +100,9 @@ mod tests {
         let squares = |values| map(values, (0..999_u64).collect(), |item| item.pow(2));
         assert_eq!(squares(FEW), squares(FEW + 1));
         assert_eq!(squares(FEW).last(), Some(&998_u64.pow(2)));
+        let items =
+            |values| map_longest_first(values, (0..999).map(|item| (item % 7, item)).collect(), |item| item);
+        assert_eq!([FEW, FEW + 1].map(items), [(); 2].map(|()| (0..999).collect::<Vec<usize>>()));
         let is_shared = |values| whole(values, || rayon::current_thread_index().is_some());
         assert_eq!([FEW, FEW + 1].map(is_shared), [false, true]);
     }

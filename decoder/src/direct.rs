@@ -84,8 +84,9 @@ pub(crate) fn decode(
     };
     let slices = planes.slices(&lengths).ok_or(APART)?;
     let tasks: Option<Vec<Task<'_, '_, '_>>> = blocks.into_iter().zip(slices).map(task).collect();
+    let tasks = lengths.into_iter().zip(tasks.ok_or(APART)?).collect();
     let decoded: Vec<(usize, Result<usize>)> =
-        cores::map(values, tasks.ok_or(APART)?, |task| workspace.run(|buffers| run(buffers, task)));
+        cores::map_longest_first(values, tasks, |task| workspace.run(|buffers| run(buffers, task)));
     let mut results: Vec<Result<usize>> = units.iter().map(|_| Ok(0)).collect();
     for (unit, block) in decoded {
         let slot = results.get_mut(unit).ok_or(APART)?;

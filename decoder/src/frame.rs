@@ -61,16 +61,22 @@ impl QuantizedFrame {
 
     /// The same; where an interrupt is requested, planes are empty.
     pub(crate) fn zeroed_unless(interrupt: &Interrupt, count: usize, sh_planes: usize) -> Self {
-        let values = count.saturating_mul(sh_planes);
+        let signed = 10_usize.saturating_add(sh_planes);
+        let values = count.saturating_mul(signed.saturating_add(3));
         let count = || if interrupt.is_requested() { 0 } else { count };
-        let planes = || [(); 3].map(|()| vec![0; count()]);
+        let positions = || [(); 3].map(|()| vec![0; count()]);
+        let (position, planes) =
+            cores::join(values, positions, || cores::map(values, vec![(); signed], |()| vec![0; count()]));
+        let mut planes = planes.into_iter();
+        // As many as were asked for.
+        let mut next = || planes.next().unwrap_or_default();
         Self {
-            position: [(); 3].map(|()| vec![0; count()]),
-            log_scale: planes(),
-            opacity: vec![0; count()],
-            rotation: planes(),
-            dc: planes(),
-            sh: cores::map(values, vec![(); sh_planes], |()| vec![0; count()]),
+            position,
+            log_scale: [next(), next(), next()],
+            opacity: next(),
+            rotation: [next(), next(), next()],
+            dc: [next(), next(), next()],
+            sh: planes.collect(),
         }
     }
 

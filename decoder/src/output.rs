@@ -29,20 +29,18 @@ pub fn to_gaussians(
     let sh_step = sequence.sh_step() * COLOUR_FRACTION;
     // In the order in which they are taken out below.
     let shapes = log_scale.map(|plane| (plane, Some(sequence.log_scale_offset()), sequence.log_scale_step()));
-    let rotations = rotation.map(|plane| (plane, None, sequence.rotation_step()));
     let opacities = [(opacity, Some(sequence.opacity_offset()), sequence.opacity_step())];
     let colours = dc.map(|plane| (plane, None, dc_step));
     let harmonics = sh.into_iter().map(|plane| (plane, None, sh_step));
     let integers: Vec<(Vec<i32>, Option<f32>, f32)> =
-        shapes.into_iter().chain(rotations).chain(opacities).chain(colours).chain(harmonics).collect();
+        shapes.into_iter().chain(opacities).chain(colours).chain(harmonics).collect();
+    let place = || (scene_positions(position, sequence), rotations(rotation, sequence));
     let convert = || cores::map(values, integers, |(plane, offset, step)| affine(plane, offset, step));
-    let (position, planes) = cores::join(values, || scene_positions(position, sequence), convert);
+    let ((position, rotation), planes) = cores::join(values, place, convert);
     let mut planes = planes.into_iter();
     // As many as were put in. One that was missing would be empty, and the frame refused for its lengths.
     let mut next = || planes.next().unwrap_or_default();
     let log_scale = [next(), next(), next()];
-    let [x, y, z] = [next(), next(), next()];
-    let rotation = [unit_w(&x, &y, &z), x, y, z];
     let opacity_logit = next();
     let dc = [next(), next(), next()];
     let planes = Planes { position, log_scale, rotation, opacity_logit, dc, sh: planes.collect() };
@@ -65,6 +63,11 @@ fn affine(plane: Vec<i32>, offset: Option<f32>, step: f32) -> Vec<f32> {
         Some(offset) => plane.into_iter().map(|q| offset + step * q as f32).collect(),
         None => plane.into_iter().map(|q| step * q as f32).collect(),
     }
+}
+
+fn rotations(rotation: [Vec<i32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 4] {
+    let [x, y, z] = rotation.map(|plane| affine(plane, None, sequence.rotation_step()));
+    [unit_w(&x, &y, &z), x, y, z]
 }
 
 /// w is what makes the quaternion a unit, 0 if x, y, z are already longer than one.
