@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """How fast this codec and others are on the same scenes, memory to memory, all in one run: in each round each of them codes
-the scene once, so that what else the machine does hits all alike. Writes DIR/speed.json and DIR/speed.md (README.md)."""
+the scene, so that what else the machine does hits all alike. Writes DIR/speed.json and DIR/speed.md (README.md)."""
 
 import argparse
 import json
@@ -88,7 +88,7 @@ class Run:
             for _ in range(self.arguments.repeat):
                 for case, row in list(rows.items()):
                     try:
-                        if not add(row, case.measure()):
+                        if not add(row, measured(case)):
                             del rows[case]
                     except Missing as why:
                         self.miss(case.name, scene, why)
@@ -119,6 +119,13 @@ class Run:
             file.write("\n")
         with open(os.path.join(self.arguments.out, "speed.md"), "w") as file:
             file.write("\n".join(self.table(scene) for scene in self.scenes))
+
+
+def measured(case):
+    """A sample of a case. What is decoded is decoded twice in a row, and the second time counts: whoever decodes frame after frame
+    has threads that are awake and memory at hand, and programs that take turns have not. What is slow needs neither."""
+    sample = case.measure()
+    return case.measure() if case.work == "decode" and sample["wall_s"] < SLOW else sample
 
 
 def add(row, sample):
