@@ -5,7 +5,7 @@
 
 use crate::attribute;
 use crate::buffers::Buffers;
-use crate::layout::{Attribute, PlaneInfo, Section};
+use crate::layout::{Attribute, Layout, PlaneInfo, Section};
 use crate::stage::Stage;
 use crate::steps::{Exponents, StepRule};
 use splatstream_format::entropy::lanes::Segments;
@@ -62,6 +62,14 @@ fn spacings(deltas: &[u64]) -> Vec<i32> {
         .zip(lengths().skip(1).chain([0]))
         .map(|(here, next)| here.wrapping_add(next).cast_signed())
         .collect()
+}
+
+/// The sums of magnitudes up to a plane: of those before it, if they are of the same attribute, and its own.
+fn sums_up_to(before: Option<Vec<i32>>, coded: &[i32]) -> Vec<i32> {
+    let Some(mut sums) = before else { return coded.iter().map(|&value| value.wrapping_abs()).collect() };
+    let each = sums.iter_mut().zip(coded);
+    each.for_each(|(sum, &value)| *sum = sum.wrapping_add(value.wrapping_abs()));
+    sums
 }
 
 impl CodedBlock {
@@ -137,16 +145,19 @@ impl CodedBlock {
         if info.section == Section::New {
             self.reconstruct(info, &coded, bias);
         }
-        let sums = match before {
-            Some(mut sums) => {
-                let each = sums.iter_mut().zip(&coded);
-                each.for_each(|(sum, &value)| *sum = sum.wrapping_add(value.wrapping_abs()));
-                sums
-            }
-            None => coded.iter().map(|&value| value.wrapping_abs()).collect(),
-        };
-        self.magnitudes.push(sums);
+        self.magnitudes.push(sums_up_to(before, &coded));
         self.coded.push(coded);
+    }
+
+    /// The same with the sums that [contexts](crate::context::plane_contexts) of any of its planes are taken from. Decoding keeps
+    /// no more of them than the next plane needs.
+    pub fn with_sums(mut self, layout: &Layout) -> Self {
+        self.magnitudes.clear();
+        for (info, coded) in layout.planes().iter().zip(&self.coded) {
+            let before = self.magnitudes.last().filter(|_| info.index > 0).cloned();
+            self.magnitudes.push(sums_up_to(before, coded));
+        }
+        self
     }
 
     /// Reconstructs what later planes take contexts and steps from; ranges are checked later.

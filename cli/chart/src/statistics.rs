@@ -214,3 +214,25 @@ impl Statistics {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use splatstream_encoder::{Settings, ShChoice, encode};
+    use splatstream_files::builtin::BuiltinScene;
+
+    /// Contexts of components are those of clusters, so that sums of magnitudes are among their sources.
+    #[test]
+    fn attributes_together_take_what_their_units_take() {
+        let scene = BuiltinScene { gaussians: 6000, ..BuiltinScene::default() };
+        let settings = Settings { sh: ShChoice::Coefficients, refinements: vec![100], ..Settings::default() };
+        let mut stream = Vec::new();
+        encode(&mut vec![scene.frame(0)], &settings, &mut stream, &mut |_, _| ()).unwrap();
+        let Statistics { sections, units, .. } = stream_statistics(&stream, &Limits::default()).unwrap();
+        let of_sections: f64 = sections.iter().map(|cost| cost.symbol_bits + cost.model_bits as f64).sum();
+        let increments = units.iter().find(|cost| cost.unit_type == UnitType::Increment).unwrap();
+        let share = of_sections / (8.0 * increments.bytes as f64);
+        // The rest is headers, and what is in the lanes at the end of a block.
+        assert!((0.97..=1.0).contains(&share), "{share}");
+    }
+}

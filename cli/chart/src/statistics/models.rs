@@ -86,6 +86,7 @@ fn add(
         let (here, after) = bits.split_at_checked(models.models.len()).unwrap_or((bits, &[]));
         let workspace = Workspace { buffers: &BufferPool::default(), interrupt: Interrupt::NEVER };
         let blocks = prepared.blocks(coded, models, sequence, workspace)?;
+        let blocks: Vec<_> = blocks.into_iter().map(|block| block.with_sums(&models.layout)).collect();
         let planes = Planes { layout: &models.layout, models: &models.models, blocks: &blocks };
         statistics.add(coded.count, &planes, here);
         bits = after;
