@@ -149,7 +149,7 @@ pub(crate) struct Encode {
     /// this option they are an error.
     #[arg(long)]
     drop_invalid: bool,
-    /// What puts Gaussians into the first refinements; default is removal, and contribution for the fast preset.
+    /// What puts Gaussians into the first refinements; default is removal, and footprint for the fast preset.
     #[arg(long, value_enum)]
     importance: Option<ImportanceName>,
     /// Views to measure importance and pictures in: a cameras.json or transforms.json, ring:N or forward:N; default is all

@@ -1,5 +1,7 @@
 //! Which Gaussians come first.
 
+mod thinning;
+
 use crate::frame::visible_difference::Pixels;
 use crate::settings::{Importance, Preset, Settings};
 use crate::verification::HEIGHT;
@@ -10,6 +12,7 @@ use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
 use splatstream_render::contribution::{SmallViews, Worth};
 use splatstream_render::rasterise::LOW_PASS;
+use thinning::Thinning;
 
 /// The Gaussians of a frame, most important first, and what pictures show of them.
 #[derive(Debug, Clone, Default)]
@@ -30,8 +33,8 @@ const BETTER_HIDDEN: f64 = -4.0;
 #[derive(Clone)]
 pub(crate) struct Ranking {
     importance: Importance,
-    /// Shares of the Gaussians at which what is kept is weighed again, percent; falling.
-    rounds: Vec<u8>,
+    /// Percentage of the Gaussians in the first refinement.
+    first: u8,
     /// The views of the GOP.
     cameras: Vec<Camera>,
     /// Whether the settings say which these are.
@@ -58,7 +61,7 @@ impl Ranking {
         };
         Self {
             importance,
-            rounds: rounds(&settings.refinements, settings.preset),
+            first: settings.refinements.first().copied().unwrap_or(100),
             cameras: settings.cameras.clone(),
             are_given: !settings.cameras.is_empty(),
             of_sequence: Vec::new(),
@@ -90,7 +93,6 @@ impl Ranking {
     pub(crate) fn for_later(&self) -> Self {
         Self {
             known_order: None,
-            rounds: self.rounds.clone(),
             cameras: self.cameras.clone(),
             of_sequence: self.of_sequence.clone(),
             ..*self
@@ -128,19 +130,15 @@ impl Ranking {
             };
         }
         self.cameras(frame);
-        let by = |shown: &[Worth], score: fn(&Worth) -> f64| {
-            let scores: Vec<f64> = shown.iter().map(score).collect();
-            ranked(&scores, frame, &all(frame.len()))
-        };
         if self.importance == Importance::Footprint {
             let (shown, level) = self.unhidden(frame);
-            return Ranked { order: by(&shown, |worth| worth.energy), shown, level };
+            return Ranked { order: thinned(frame, &shown), shown, level };
         }
         let views = self.views(frame);
         let shown = views.worth();
         let order = match self.importance {
             Importance::Removal => self.eliminate(views, frame, &shown),
-            _ => by(&shown, |worth| worth.contribution),
+            _ => ranked(&shown.iter().map(|worth| worth.contribution).collect::<Vec<_>>(), frame),
         };
         Ranked { order, shown, level: self.level() }
     }
@@ -211,32 +209,45 @@ impl Ranking {
         (self.cameras.iter().step_by(stride).cloned().collect(), lines)
     }
 
-    /// From the last to the first: what pictures miss least goes, the rest is weighed again without it.
-    ///
-    /// One look at the whole frame would keep none of two Gaussians that hide each other's loss. The score is the
-    /// geometric mean of what a Gaussian gives and what is lost without it: the loss alone takes no account of what
-    /// goes at the same time, the contribution alone none of how alike things look.
+    /// From the last to the first: what pictures [miss least](Thinning) goes, the rest is weighed again without it, until the
+    /// first refinement is left.
+    #[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
     fn eliminate(&self, mut views: SmallViews, frame: &GaussianFrame, whole: &[Worth]) -> Vec<u32> {
-        let count = frame.len();
-        let mut kept = all(count);
-        let mut gone: Vec<u32> = Vec::new();
-        for &percent in &self.rounds {
-            kept.sort_unstable();
-            let of_kept = match kept.len() == count {
-                true => whole.to_vec(),
-                false => {
-                    views.leave(&kept);
-                    views.worth()
-                }
-            };
-            let scores: Vec<f64> = of_kept.iter().map(|w| (w.contribution * w.loss).sqrt()).collect();
-            kept = ranked(&scores, frame, &kept);
-            let going = kept.split_off(prefix_length(percent, count as u32) as usize);
-            gone = going.into_iter().chain(gone).collect();
+        let mut left = Thinning::new(frame);
+        let mut shown = whole.to_vec();
+        let rounds = self.rounds(frame.len() as u32);
+        let mut order = left.leave(&shown, rounds.first().map_or(0, |&kept| kept as usize));
+        for number in 1..=rounds.len() {
+            let rows = left.rows();
+            views.leave(&rows);
+            rows.iter().zip(views.worth()).for_each(|(&row, worth)| shown[row as usize] = worth);
+            let mut gone = left.leave(&shown, rounds.get(number).map_or(0, |&kept| kept as usize));
+            gone.append(&mut order);
+            order = gone;
         }
-        kept.extend(gone);
-        kept
+        order
     }
+
+    /// How many of `count` Gaussians are left when they are weighed again, falling: no more than about half of them go
+    /// at once, and no more than a quarter where time is no matter. The first refinement is not weighed again.
+    fn rounds(&self, count: u32) -> Vec<u32> {
+        let sixteenths = match self.preset {
+            Preset::Fast | Preset::Balanced => 9,
+            Preset::Small => 12,
+        };
+        let fewer = |&kept: &u32| Some((u64::from(kept).saturating_mul(sixteenths) / 16) as u32);
+        let first = prefix_length(self.first, count);
+        core::iter::successors(Some(count), fewer).skip(1).take_while(|&kept| kept > first).collect()
+    }
+}
+
+/// Of what a Gaussian would show if nothing hid it, about so much is lost where only that one is missing: others overlap it.
+const OVERLAPPED: f64 = 0.1;
+
+/// The Gaussians of a frame, most important first, by what is [shown](unhidden) of them if nothing hides them.
+fn thinned(frame: &GaussianFrame, shown: &[Worth]) -> Vec<u32> {
+    let missed = |worth: &Worth| Worth { loss: OVERLAPPED * worth.energy, ..*worth };
+    Thinning::new(frame).leave(&shown.iter().map(missed).collect::<Vec<_>>(), 0)
 }
 
 /// Views all around stand apart by less than this part of their distance to what they show, if they show the same.
@@ -316,46 +327,25 @@ pub(crate) fn unhidden(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> 
 /// Gaussians that are looked at together.
 const AT_ONCE: usize = 1 << 10;
 
-fn all(count: usize) -> Vec<u32> {
-    (0..count as u32).collect()
-}
-
-/// `gaussians` of a frame by falling score; those that no view tells apart by opacity times volume. `scores` go with
-/// `gaussians`.
-#[expect(clippy::indexing_slicing, reason = "rows are those of the frame; windows have two entries")]
-fn ranked(scores: &[f64], frame: &GaussianFrame, gaussians: &[u32]) -> Vec<u32> {
-    let volume = |row: u32| {
-        let log_scale = frame.log_scale().each_ref().map(|plane| plane[row as usize]);
-        importance::opacity_volume_of(log_scale, frame.opacity_logit()[row as usize])
-    };
-    let mut rows: Vec<(f64, u32)> = scores.iter().copied().zip(gaussians.iter().copied()).collect();
+/// The Gaussians of a frame by falling score; those that no view tells apart by opacity times volume.
+fn ranked(scores: &[f64], frame: &GaussianFrame) -> Vec<u32> {
+    let mut rows: Vec<(f64, u32)> = scores.iter().copied().zip(0..).collect();
     let falling = |a: &(f64, u32), b: &(f64, u32)| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1));
     rows.par_sort_unstable_by(falling);
     // Volumes take long to calculate, and most Gaussians need none.
     let ties = rows.par_chunk_by_mut(|a, b| a.0.total_cmp(&b.0).is_eq());
     ties.filter(|tied| tied.len() > 1).for_each(|tied| {
-        tied.par_iter_mut().with_min_len(AT_ONCE).for_each(|(score, row)| *score = volume(*row));
+        tied.par_iter_mut().with_min_len(AT_ONCE).for_each(|(score, row)| *score = volume(frame, *row));
         tied.par_sort_unstable_by(falling);
     });
     rows.into_iter().map(|(_, gaussian)| gaussian).collect()
 }
 
-/// The refinements from the last but one down; where time is no matter, with steps between them so that no
-/// more than a quarter goes at once.
-#[expect(clippy::indexing_slicing, reason = "rows are those of the frame; windows have two entries")]
-fn rounds(refinements: &[u8], preset: Preset) -> Vec<u8> {
-    let mut rounds = Vec::new();
-    for pair in refinements.windows(2).rev() {
-        let [low, mut high] = [pair[0], pair[1]];
-        if preset == Preset::Small {
-            while u32::from(high) * 3 / 4 > u32::from(low) {
-                high = (u32::from(high) * 3 / 4) as u8;
-                rounds.push(high);
-            }
-        }
-        rounds.push(low);
-    }
-    rounds
+/// Opacity times volume of a row of a frame.
+#[expect(clippy::indexing_slicing, reason = "rows are those of the frame")]
+fn volume(frame: &GaussianFrame, row: u32) -> f64 {
+    let log_scale = frame.log_scale().each_ref().map(|plane| plane[row as usize]);
+    importance::opacity_volume_of(log_scale, frame.opacity_logit()[row as usize])
 }
 
 #[cfg(test)]
@@ -365,8 +355,13 @@ mod tests {
 
     #[test]
     fn rounds_fall_to_the_first_refinement() {
-        assert_eq!(rounds(&[10, 20, 30, 50, 100], Preset::Balanced), [50, 30, 20, 10]);
-        assert_eq!(rounds(&[10, 50, 100], Preset::Small), [75, 56, 50, 37, 27, 20, 15, 11, 10]);
+        let rounds = |first: u8, preset: Preset| {
+            let refinements = vec![first, 50, 100];
+            Ranking::new(&Settings { refinements, preset, ..Settings::default() }).rounds(1000)
+        };
+        assert_eq!(rounds(10, Preset::Balanced), [562, 316, 177]);
+        assert_eq!(rounds(20, Preset::Small), [750, 562, 421, 315, 236]);
+        assert!(rounds(60, Preset::Balanced).is_empty());
     }
 
     #[test]
@@ -396,6 +391,6 @@ mod tests {
         let splatstream_gaussians::PlanesMut { log_scale, opacity_logit, .. } = frame.planes_mut();
         opacity_logit.fill(0.0);
         log_scale.into_iter().for_each(|plane| plane.copy_from_slice(&[0.0, -3.0, 1.0, 0.0]));
-        assert_eq!(ranked(&[0.0, 2.0, 0.0, 0.0], &frame, &[0, 1, 2, 3]), [1, 2, 0, 3]);
+        assert_eq!(ranked(&[0.0, 2.0, 0.0, 0.0], &frame), [1, 2, 0, 3]);
     }
 }

@@ -18,7 +18,7 @@ pub enum Preset {
     /// Two context sources a plane; vector quantisation is tried on a sample.
     #[default]
     Balanced,
-    /// As balanced, with every source tried for both axes, and more rounds of ordering.
+    /// As balanced, with every source tried for both axes, and Gaussians weighed again whenever a quarter of them have gone.
     Small,
 }
 
@@ -81,13 +81,14 @@ pub enum ShChoice {
 /// What puts Gaussians into the first refinements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Importance {
-    /// The geometric mean of contribution and of what the pictures lose without a Gaussian; weighed again at each
-    /// refinement, from the last down.
+    /// The geometric mean of contribution and of what the pictures lose without a Gaussian. Gaussians go one after the other,
+    /// the least first; what is lost without one rises as its neighbours go, and all that are left are weighed again whenever
+    /// about half of them have gone.
     Removal,
     /// Transmittance times alpha, summed over the pixels of all views.
     Contribution,
-    /// Opacity squared times the pixels that it covers, mean of the views: what they would show if no Gaussian hid
-    /// another. No picture is drawn.
+    /// The same of what views would show if no Gaussian hid another: opacity and the pixels that it covers, means of the views. No
+    /// picture is drawn.
     Footprint,
     /// Opacity times volume: the paper's, and the only one that needs no views.
     Volume,

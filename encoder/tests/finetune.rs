@@ -148,7 +148,7 @@ fn every_attribute_is_reached_and_the_others_are_held() {
     let before = planes(&encoded(scene(), &plain()).0);
     for own in ALL {
         let held = ALL.into_iter().filter(|&attribute| attribute != own).collect();
-        let finetune = Some(Finetune { held, ..quick(20) });
+        let finetune = Some(Finetune { held, ..quick(40) });
         let after = planes(&encoded(scene(), &Settings { finetune, ..plain() }).0);
         // Other steps follow from log-scales and opacities, and the order of coding from positions.
         let sorted = |planes: &[Vec<i32>]| planes.iter().map(|plane| sorted(plane)).collect::<Vec<_>>();

@@ -159,16 +159,16 @@ fn tables(report: &Report) -> Vec<Choice> {
 
 fn order(report: &Report, settings: &Settings) -> Option<Choice> {
     let (choice, why) = match report.importance? {
-        Importance::Removal => (
-            "removal",
-            "what pictures gain by a Gaussian and lose without it, weighed again at each refinement",
-        ),
+        Importance::Removal => {
+            ("removal", "what pictures gain by a Gaussian and lose without it, weighed again as others go")
+        }
         Importance::Contribution => {
             ("contribution", "transmittance times alpha over the pixels of all views")
         }
-        Importance::Footprint => {
-            ("footprint", "opacity squared times the pixels covered, mean of all views, whatever hides it")
-        }
+        Importance::Footprint => (
+            "footprint",
+            "opacity and the pixels covered, mean of all views, whatever hides it; weighed again as neighbours go",
+        ),
         Importance::Volume => ("volume", "opacity times volume, no views"),
     };
     let views = match (report.importance?, settings.cameras.len()) {
