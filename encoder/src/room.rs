@@ -41,7 +41,7 @@ pub(crate) struct Announced {
 pub(crate) fn announce(mut survey: Survey, settings: &Settings) -> Result<(Analysis, Announced), Error> {
     let scene = &mut survey.scene;
     scene.extent = scene.extent.widened(BOXES);
-    let [scale, opacity] = scene.means;
+    let [scale, opacity] = scene.origins;
     let [scale_reach, opacity_reach, dc_reach, sh_reach] = &mut scene.reach;
     *scale_reach += SCALE_ROOM;
     *opacity_reach = opacity_reach.max(OPACITY_ROOM);

@@ -246,8 +246,8 @@ pub(crate) struct Scene {
     cores: Vec<Core>,
     /// Positions and squared opacities of some Gaussians of the first frame that has any.
     sample: Vec<([f32; 3], f32)>,
-    /// Means of the largest log-scale and of the opacity in that frame.
-    pub(crate) means: [f32; 2],
+    /// [Where grids](origins) of log-scales and of opacities start.
+    pub(crate) origins: [f32; 2],
     /// Farthest values from them, and the largest colours: log-scale, opacity, dc, sh.
     pub(crate) reach: [f32; 4],
 }
@@ -255,7 +255,13 @@ pub(crate) struct Scene {
 impl Scene {
     /// Of no frame.
     pub(crate) fn new() -> Self {
-        Self { extent: Extent::NONE, cores: Vec::new(), sample: Vec::new(), means: [0.0; 2], reach: [0.0; 4] }
+        Self {
+            extent: Extent::NONE,
+            cores: Vec::new(),
+            sample: Vec::new(),
+            origins: [0.0; 2],
+            reach: [0.0; 4],
+        }
     }
 
     /// Adds the Gaussians of a frame that can be seen.
@@ -266,7 +272,7 @@ impl Scene {
         }
         if self.cores.is_empty() {
             self.sample = Reach::sample(frame, shown);
-            self.means = means(frame, shown);
+            self.origins = origins(frame, shown);
         }
         let (extent, core) = rayon::join(|| self.extent.with(frame, shown), || Core::of(frame, shown));
         self.extent = extent;
@@ -287,7 +293,7 @@ impl Scene {
             let of_row = |&row: &u32| planes.iter().map(|plane| square(plane, row)).sum::<f32>();
             rows().map(of_row).reduce(|| 0.0, f32::max).sqrt()
         };
-        let [scale, opacity] = self.means;
+        let [scale, opacity] = self.origins;
         let reach = [
             farthest(&frame.log_scale().each_ref().map(Vec::as_slice), scale),
             farthest(&[frame.opacity_logit()], opacity),
@@ -330,10 +336,10 @@ impl Scene {
             frame_count: frames,
             ticks_per_second: settings.ticks.0,
             ticks_per_frame: settings.ticks.1,
-            log_scale_offset: self.means[0].to_bits(),
+            log_scale_offset: self.origins[0].to_bits(),
             log_scale_step: finest(steps.log_scale, scale, MAX_DIFFERING).to_bits(),
             rotation_step: finest(rotation, 1.0, MAX_DIFFERING).to_bits(),
-            opacity_offset: self.means[1].to_bits(),
+            opacity_offset: self.origins[1].to_bits(),
             opacity_step: finest(steps.opacity, opacity, MAX_DIFFERING).to_bits(),
             dc_step: colour(steps.dc, dc).to_bits(),
             sh_step: colour(steps.sh, sh).to_bits(),
@@ -348,17 +354,49 @@ impl Scene {
     }
 }
 
-/// Means of the largest log-scale and of the opacity, so that what is coded is near 0.
+/// What the grids of log-scales and of opacities start from: a value that many Gaussians share, of which no step makes an error that
+/// all of them have; and where there is none the mean, so that what is coded is near 0. Of log-scales the largest of
+/// each Gaussian counts.
 #[expect(clippy::indexing_slicing, reason = "axes are constants, and rows are those of the frame")]
-fn means(frame: &GaussianFrame, shown: &[u32]) -> [f32; 2] {
-    let mean = |value: &(dyn Fn(usize) -> f32 + Sync)| {
-        let sum: f64 = shown.iter().map(|&row| f64::from(value(row as usize))).sum();
-        (sum / shown.len().max(1) as f64) as f32
+fn origins(frame: &GaussianFrame, shown: &[u32]) -> [f32; 2] {
+    let origin = |value: &(dyn Fn(usize) -> f32 + Sync)| {
+        let of_sample = shown.iter().step_by(shown.len().div_ceil(SAMPLE).max(1));
+        shared(of_sample.map(|&row| value(row as usize)).collect()).unwrap_or_else(|| {
+            let sum: f64 = shown.iter().map(|&row| f64::from(value(row as usize))).sum();
+            (sum / shown.len().max(1) as f64) as f32
+        })
     };
     let [a, b, c] = frame.log_scale();
     let (size, opacity) = rayon::join(
-        || mean(&|row| a[row].max(b[row]).max(c[row])),
-        || mean(&|row| frame.opacity_logit()[row]),
+        || origin(&|row| a[row].max(b[row]).max(c[row])),
+        || origin(&|row| frame.opacity_logit()[row]),
     );
     [size, opacity]
+}
+
+/// Values of which the commonest is looked for, at most.
+const SAMPLE: usize = 1 << 14;
+/// A value is common if it is more than one of so many.
+const RARE: usize = 20;
+
+/// The commonest of some values, if it is common.
+fn shared(mut values: Vec<f32>) -> Option<f32> {
+    let rare = values.len() / RARE;
+    values.sort_unstable_by(f32::total_cmp);
+    let commonest = values.chunk_by(|a, b| a == b).max_by_key(|same| same.len())?;
+    commonest.first().filter(|_| commonest.len() > rare.max(1)).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn grids_start_from_a_value_that_many_share() {
+        let spread: Vec<f32> = (0..1000).map(|number| number as f32).collect();
+        assert_eq!(shared(spread.clone()), None);
+        assert_eq!(shared([spread, vec![-4.6; 60]].concat()), Some(-4.6));
+        assert_eq!(shared(vec![2.0]), None);
+        assert_eq!(shared(Vec::new()), None);
+    }
 }
