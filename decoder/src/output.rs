@@ -58,6 +58,8 @@ fn scene_positions(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [V
     })
 }
 
+// Once in modules for web pages, which has two callers and takes as long as the plane does.
+#[inline(never)]
 fn affine(plane: Vec<i32>, offset: Option<f32>, step: f32) -> Vec<f32> {
     match offset {
         Some(offset) => plane.into_iter().map(|q| offset + step * q as f32).collect(),
