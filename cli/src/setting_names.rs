@@ -107,11 +107,11 @@ pub(crate) enum AnchorName {
 /// What puts Gaussians into the first refinements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum ImportanceName {
-    /// What pictures gain by a Gaussian and lose without it, weighed again at each refinement.
+    /// What pictures gain by a Gaussian and lose without it, weighed again as others go.
     Removal,
     /// Transmittance times alpha over the pixels of all views.
     Contribution,
-    /// Opacity squared times the pixels covered, mean of all views, whatever hides it; needs no pictures.
+    /// Opacity and the pixels covered, mean of all views, whatever hides it, weighed again as neighbours go; needs no pictures.
     Footprint,
     /// Opacity times volume; needs no views.
     Volume,

@@ -272,7 +272,7 @@ impl Fit {
     /// missed, and not refused. For values that are mistakes steps stay as fine as they are: these values are refused.
     pub(crate) fn no_finer(&self, mut steps: Steps) -> Steps {
         let ([scale, opacity], [scale_reach, opacity_reach, ..]) = (self.scene.origins, self.scene.reach);
-        let least = |[usual, mean, reach]: [f32; 3], most: f32| usual.min(mean.abs() + reach) / most;
+        let least = |[usual, origin, reach]: [f32; 3], most: f32| usual.min(origin.abs() + reach) / most;
         steps.log_scale = steps.log_scale.max(least([USUAL[0], scale, scale_reach], MAX_LOG_SCALE));
         steps.opacity = steps.opacity.max(least([USUAL[1], opacity, opacity_reach], MAX_OPACITY));
         steps

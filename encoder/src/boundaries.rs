@@ -27,8 +27,8 @@ const LINES: u32 = 144;
 /// Percentages of the Gaussians up to each of `count` refinements, rising, the last 100, so that pictures of the first frame are
 /// as good as they can be for receivers that take any part of its bytes. What the settings say about refinements is not read.
 ///
-/// This ranks the frame once more, at all places where a refinement may end: that takes about as long as the ranking of a
-/// frame with as many refinements does.
+/// This ranks the frame once more, down to the first place where a refinement may end: that takes a little longer than the
+/// ranking of a frame whose first refinement ends later.
 ///
 /// # Errors
 /// `count` outside 1 to 10, no frame, or a first frame that [`encode`](crate::encode) would refuse.
