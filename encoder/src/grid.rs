@@ -25,14 +25,33 @@ pub(crate) const MAX_COLOUR: f32 = 16.0;
 /// The integers of a frame that are coded as they are: all but colour. In the order of the source.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Geometry {
-    /// Codes of positions.
-    pub(crate) position: [Vec<u32>; 3],
+    pub(crate) position: [Vec<Place>; 3],
     /// Log-scales, [`PARTS`] of a step.
     pub(crate) log_scale: [Vec<i32>; 3],
     /// Opacity logit, parts of a step.
     pub(crate) opacity: Vec<i32>,
     /// Quaternion x, y, z, parts of a step; none of a sphere.
     pub(crate) rotation: [Vec<i32>; 3],
+}
+
+/// Where a coordinate is among the codes of its grid, half steps, cut off: enough to tell which code is nearest to it, and in which
+/// cell of every coarser grid it is. The nearest code does not tell that: a coordinate nearest to the first code of a cell
+/// may lie before the cell, nearer to the middle of the one before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Place(u32);
+
+impl Place {
+    /// The nearest code, or the cell of 2^shift codes that the coordinate is in.
+    #[expect(clippy::arithmetic_side_effects, reason = "a code has at most 26 bits, and leaves out fewer")]
+    pub(crate) fn code(self, shift: u8) -> u32 {
+        if shift == 0 { (self.0 + 1) >> 1 } else { self.0 >> (shift + 1) }
+    }
+
+    /// The steps of 2^shift codes that bring a code nearest to the coordinate, halves up.
+    #[expect(clippy::arithmetic_side_effects, reason = "a code has at most 26 bits, and leaves out fewer")]
+    pub(crate) fn steps_from(self, code: u32, shift: u8) -> i32 {
+        (self.0 as i32 - 2 * code as i32 + (1 << shift)) >> (shift + 1)
+    }
 }
 
 /// The codes of positions: points of a grid that is coarser far from its middle (clause 7.10).
@@ -74,10 +93,10 @@ impl PositionGrid {
         self.middle + compressed(apart.abs(), self.linear, self.segment).copysign(apart)
     }
 
-    /// The code whose point is nearest to a coordinate.
-    pub(crate) fn code(&self, axis: usize, value: f32) -> u32 {
+    /// Where a coordinate is among the codes.
+    pub(crate) fn place(&self, axis: usize, value: f32) -> Place {
         // The map is linear between two codes, so that the nearest code is that of the nearest point.
-        libm::rint(self.exact(axis, value)).clamp(0.0, self.last) as u32
+        Place((2.0 * self.exact(axis, value)).clamp(0.0, 2.0 * self.last) as u32)
     }
 
     /// Whether a coordinate is farther out than the last code, by more than half of the step there.
@@ -118,7 +137,7 @@ pub(crate) fn geometry(frame: &GaussianFrame, sequence: &SequenceParameters) -> 
     let grid = PositionGrid::of(sequence);
     let mut position = [const { Vec::new() }; 3];
     for (axis, (plane, values)) in position.iter_mut().zip(frame.position()).enumerate() {
-        *plane = values.par_iter().map(|&value| grid.code(axis, value)).collect();
+        *plane = values.par_iter().map(|&value| grid.place(axis, value)).collect();
     }
     let (offset, step) = (sequence.log_scale_offset(), sequence.log_scale_step());
     let log_scale = frame.log_scale().each_ref().map(|plane| parts(plane, offset, step));
@@ -224,9 +243,21 @@ mod tests {
             let middle = 1_i64 << (bits - 1);
             for code in (0..1_u32 << bits).step_by(if bits > 8 { 997 } else { 1 }) {
                 let point = (companding.expand(code) - middle) as f32 * 0.25;
-                assert_eq!(grid.code(0, point), code, "{bits} {linear} {segment}");
+                assert_eq!(grid.place(0, point).code(0), code, "{bits} {linear} {segment}");
                 assert!(!grid.is_beyond(0, point));
             }
+        }
+    }
+
+    #[test]
+    fn coarse_cells_are_those_that_coordinates_are_in() {
+        let (grid, _) = grid(8, 7, 7);
+        for quarters in 0..200 {
+            let value = f64::from(quarters) / 4.0 - 1.0;
+            let place = grid.place(0, 0.25 * value as f32 - 32.0);
+            assert_eq!(f64::from(place.code(2)), (value.max(0.0) / 4.0).floor());
+            // From the middle of the third cell, 10, in steps of a cell.
+            assert_eq!(f64::from(place.steps_from(10, 2)), ((value.max(0.0) - 10.0) / 4.0 + 0.5).floor());
         }
     }
 
@@ -236,7 +267,7 @@ mod tests {
             let (grid, companding) = grid(8, 4, 3);
             let point = |code: u32| (companding.expand(code) - 128) as f32 * 0.25;
             let nearest = (0..256).map(|code| (point(code) - value).abs()).fold(f32::INFINITY, f32::min);
-            prop_assert!((point(grid.code(0, value)) - value).abs() <= nearest * 1.0001);
+            prop_assert!((point(grid.place(0, value).code(0)) - value).abs() <= nearest * 1.0001);
         }
     }
 }

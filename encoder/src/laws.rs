@@ -126,15 +126,14 @@ impl Laws {
         })
     }
 
-    /// Low bits of positions that a refinement leaves out: fewer than half octaves say, as views from nearby show
-    /// positions best.
+    /// Low bits of positions that a refinement leaves out: one for two half octaves, rounded up.
     #[expect(
         clippy::arithmetic_side_effects,
         reason = "counts in memory; exponents are at most 13 and positions have 1 bit or more"
     )]
     pub(crate) fn position_shift(&self, sequence: &SequenceParameters, refinement: u8) -> u8 {
         let coarser = self.coarser[usize::from(refinement)];
-        (coarser / 3).min(sequence.position_bits - 1)
+        coarser.div_ceil(2).min(sequence.position_bits - 1)
     }
 }
 

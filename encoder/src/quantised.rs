@@ -10,7 +10,7 @@ use crate::combination::{self, Combination, TILE, Tile};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
 use crate::frame::grain::Grains;
-use crate::grid::{Geometry, geometry, nearest_integer};
+use crate::grid::{Geometry, Place, geometry, nearest_integer};
 use crate::pca::Components;
 use crate::shape::{Shape, nearest_multiple};
 use pulp::{Arch, Simd, WithSimd};
@@ -114,8 +114,8 @@ impl<'a> Trial<'a> {
         let companding = Companding::new(self.sequence);
         let (offset, step) = (self.sequence.position_offset(), self.sequence.position_step());
         [0, 1, 2].map(|axis: usize| {
-            let value = |(coded, &code): (&Coded, &u32)| {
-                let code = refine(code >> coded.position_shift, coded.position_shift);
+            let value = |(coded, place): (&Coded, &Place)| {
+                let code = refine(place.code(coded.position_shift), coded.position_shift);
                 offset[axis] + step * companding.expand(code) as f32
             };
             self.coded.par_iter().zip(&self.geometry.position[axis]).map(value).collect()

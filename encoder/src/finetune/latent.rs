@@ -13,6 +13,7 @@ use crate::error::Error;
 use crate::frame::grain::Grain;
 use crate::frame::residuals::Wanted;
 use crate::frame::unit::UnitCoder;
+use crate::grid::Place;
 use core::ops::Range;
 use rayon::prelude::*;
 use splatstream_decoder::frame::QuantizedFrame;
@@ -211,9 +212,9 @@ impl<'a> Latent<'a> {
         let sh_planes = usize::from(coder.sequence.sh_dimension());
         let mut attributes = Attributes::unpredicted(rows.len(), &coder.colour, sh_planes);
         attributes.add(AttributeValues(&values), &coder.coding(attribute_step), 0)?;
-        let nearest = |&code: &u32| refine(code >> shift, shift);
-        let codes = wanted.position.each_ref().map(|plane| &plane[list.rows.clone()]);
-        let position = codes.map(|plane| plane.iter().map(nearest).collect());
+        let nearest = |place: &Place| refine(place.code(shift), shift);
+        let places = wanted.position.each_ref().map(|plane| &plane[list.rows.clone()]);
+        let position = places.map(|plane| plane.iter().map(nearest).collect());
         Ok(Part { position, moves: Vec::new(), values, attributes })
     }
 

@@ -228,7 +228,7 @@ fn predicted(
     let position = wanted
         .position
         .each_ref()
-        .map(|plane| -> Vec<u32> { plane.iter().map(|&value| refine(value >> shift, shift)).collect() });
+        .map(|plane| -> Vec<u32> { plane.iter().map(|place| refine(place.code(shift), shift)).collect() });
     let sh_planes = usize::from(coder.sequence.sh_dimension());
     let mut now = Attributes::unpredicted(wanted.len(), &coder.colour, sh_planes);
     let predictors = vec![predictor; wanted.len()];

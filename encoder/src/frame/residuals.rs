@@ -11,7 +11,7 @@
 use super::unit::UnitCoder;
 use crate::colour;
 use crate::gop_tools::{dc_planes, sh_planes};
-use crate::grid::{Geometry, geometry, nearest_integer};
+use crate::grid::{Geometry, Place, geometry, nearest_integer};
 use crate::shape::{Shape, nearest_multiple, scale_residuals, scale_updates};
 use crate::vq;
 use pulp::{Arch, Simd, WithSimd};
@@ -30,8 +30,7 @@ use splatstream_gaussians::GaussianFrame;
 /// [parts](crate::grid::PARTS) of a step: they are rounded once, when their steps are known.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Wanted {
-    /// Codes.
-    pub(crate) position: [Vec<u32>; 3],
+    pub(crate) position: [Vec<Place>; 3],
     log_scale: [Vec<i32>; 3],
     opacity: Vec<i32>,
     rotation: [Vec<i32>; 3],
@@ -124,7 +123,7 @@ impl Wanted {
 
     /// The Morton code of a Gaussian on the grid of every 2^shift-th point.
     pub(crate) fn code(&self, index: u32, shift: u8) -> u64 {
-        let [x, y, z] = self.position.each_ref().map(|plane| plane[index as usize] >> shift);
+        let [x, y, z] = self.position.each_ref().map(|plane| plane[index as usize].code(shift));
         morton(x, y, z)
     }
 
@@ -135,11 +134,8 @@ impl Wanted {
 
     /// What brings positions near those wanted, in steps of 2^shift, and not beyond the last grid point.
     pub(crate) fn moves(&self, list: &GaussianList, shift: u8, last: i32) -> Vec<Vec<i32>> {
-        let step = |wanted: u32, now: u32| {
-            let now = now as i32;
-            nearest(wanted as i32 - now, shift).min((last - now) >> shift)
-        };
-        let of_axis = |(wanted, now): (&Vec<u32>, &Vec<u32>)| {
+        let step = |wanted: Place, now: u32| wanted.steps_from(now, shift).min((last - now as i32) >> shift);
+        let of_axis = |(wanted, now): (&Vec<Place>, &Vec<u32>)| {
             wanted.iter().zip(now).map(|(&wanted, &now)| step(wanted, now)).collect()
         };
         self.position.iter().zip(&list.planes.position).map(of_axis).collect()
@@ -281,11 +277,6 @@ fn fine(plane: &[f32], step: f32) -> Vec<i32> {
     let scale = crate::grid::PARTS / step;
     let most = (COMPONENT_RANGE.end() * crate::shape::PARTS) as f32;
     plane.par_iter().map(|&value| nearest_integer((value * scale).clamp(-most, most))).collect()
-}
-
-/// x / 2^shift to the nearest integer, halves up.
-fn nearest(x: i32, shift: u8) -> i32 {
-    if shift == 0 { x } else { (x + (1 << (shift - 1))) >> shift }
 }
 
 fn differences(wanted: &[i32], now: &[i32], exponents: &Exponents) -> Vec<i32> {
