@@ -36,7 +36,7 @@ use deviation::Deviation;
 use splatstream_decoder::list::GaussianList;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::CellsBytes;
-use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
+use splatstream_format::syntax::IncrementHeader;
 use target::Target;
 use unit::UnitCoder;
 
@@ -53,27 +53,38 @@ pub(crate) struct Reference {
     rows: Vec<Vec<u32>>,
     /// Rows of the file.
     row_count: u32,
-    /// What its Gaussians differ by from their source because values were fitted; none: nothing but what rounding makes of them.
+    /// What its Gaussians differ by from their source; none: nothing of it stays in frames that refer to this one.
     deviation: Option<Deviation>,
 }
 
 impl Reference {
-    /// Has what is predicted from an I frame follow its fitted values, and not those of its source. `members`: the place of each
-    /// Gaussian in the target, list by list.
+    /// Has what is predicted from a frame follow what was decoded of it, and not its source alone. `is_fitted`: all of the way, since
+    /// values were chosen by pictures.
     ///
     /// # Errors
     /// Lists whose planes make no frame.
     pub(crate) fn differs_from(
         &mut self,
-        (target, members): (&Target, &[Vec<u32>]),
-        sequence: &SequenceParameters,
+        target: &Target,
+        coder: &UnitCoder<'_>,
+        is_fitted: bool,
     ) -> Result<(), Error> {
-        self.deviation = Some(Deviation::of_intra((&self.lists, members), target, sequence)?);
+        self.deviation = Some(Deviation::of((&self.lists, &self.rows), target, coder, is_fitted)?);
         Ok(())
     }
 
+    /// Whether it differs from its source because values were fitted.
+    pub(crate) fn is_fitted(&self) -> bool {
+        self.deviation.as_ref().is_some_and(|deviation| deviation.is_fitted)
+    }
+
+    /// What it differs by from its source, if that is what rounding has made of it.
+    pub(crate) fn rounded(&self) -> Option<&Deviation> {
+        self.deviation.as_ref().filter(|deviation| !deviation.is_fitted)
+    }
+
     /// What a frame shall become that is predicted from this one; none: what its source has.
-    pub(crate) fn fitted(
+    pub(crate) fn followed(
         &self,
         target: &Target,
         matching: &Matching,

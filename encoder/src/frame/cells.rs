@@ -70,14 +70,13 @@ impl ReferenceCloud {
         }
     }
 
-    /// The same with the values of its source, as far as it differs from that because values were fitted to pictures.
+    /// The same with the values of its source, as far as it is known what it differs by.
     pub(crate) fn of_source(reference: &Reference, sequence: &SequenceParameters) -> Self {
         let mut cloud = Self::new(reference, sequence);
-        if let Some(Deviation { position, values }) = &reference.deviation {
-            let own = cloud.position.iter_mut().chain(&mut cloud.log_scale).chain(&mut cloud.dc);
-            let own = own.chain([&mut cloud.opacity]);
-            let off = position.iter().chain(values.log_scale()).chain(values.dc()).map(Vec::as_slice);
-            for (own, off) in own.zip(off.chain([values.opacity_logit()])) {
+        if let Some(Deviation { position, log_scale, opacity, colours, .. }) = &reference.deviation {
+            let own = cloud.position.iter_mut().chain(&mut cloud.log_scale).chain([&mut cloud.opacity]);
+            let off = position.iter().chain(log_scale).chain([opacity]).chain(colours);
+            for (own, off) in own.chain(&mut cloud.dc).zip(off) {
                 own.iter_mut().zip(off).for_each(|(value, off)| *value -= off);
             }
         }

@@ -6,7 +6,7 @@
 
 use super::axis_matching::Pose;
 use crate::vq;
-use splatstream_format::payload::Codebook;
+use splatstream_format::payload::{Codebook, Transform};
 
 /// Where the opacity, the rotation and dc are among the attributes, after the log-scales.
 pub(crate) const OPACITY: usize = 3;
@@ -14,6 +14,7 @@ pub(crate) const ROTATION: usize = 4;
 pub(crate) const COLOUR: usize = 7;
 
 /// How far a Gaussian is from its partner, in steps of the sequence.
+#[derive(Clone)]
 pub(crate) struct Apart {
     pub(crate) position: [f32; 3],
     /// Log-scales, opacity, rotation, components of dc and of sh.
@@ -42,12 +43,22 @@ impl Apart {
         self.sh().iter().map(|value| value / self.steps[4]).collect()
     }
 
-    /// Whether some difference is larger than this, in the steps that it is coded with.
-    pub(crate) fn is_beyond(&self, most: f32) -> bool {
-        let mut moves = self.position.iter().map(|change| change / self.move_step);
-        let mut attributes =
-            (0..).zip(&self.attributes).map(|(attribute, change)| change / self.step_of(attribute));
-        moves.any(|steps| steps.abs() > most) || attributes.any(|steps| steps.abs() > most)
+    /// Whether it is farther away than this on some axis, in steps of moves.
+    pub(crate) fn is_far(&self, most: f32) -> bool {
+        self.position.iter().any(|change| (change / self.move_step).abs() > most)
+    }
+
+    /// Whether some attribute differs by more than this, in the steps that it is coded with.
+    pub(crate) fn is_unlike(&self, most: f32) -> bool {
+        let mut attributes = (0..).zip(&self.attributes);
+        attributes.any(|(attribute, change)| (change / self.step_of(attribute)).abs() > most)
+    }
+
+    /// The same to what the partner is before it keeps of an earlier difference what stays.
+    pub(crate) fn without(mut self, kept: &Stays) -> Self {
+        self.position.iter_mut().zip(kept.position).for_each(|(change, kept)| *change -= kept);
+        self.attributes.iter_mut().zip(&kept.attributes).for_each(|(change, kept)| *change -= kept);
+        self
     }
 
     /// All differences.
@@ -77,6 +88,12 @@ impl Apart {
     }
 }
 
+/// What a Gaussian keeps of a difference of an earlier frame, in steps of the sequence: as in [`Apart`], without sh.
+pub(crate) struct Stays {
+    pub(crate) position: [f32; 3],
+    pub(crate) attributes: Vec<f32>,
+}
+
 /// What is sent of the differences.
 pub(crate) struct Kept {
     /// Whether the position is worth a move.
@@ -85,4 +102,15 @@ pub(crate) struct Kept {
     pub(crate) attributes: Vec<f32>,
     /// The entry of the codebook of SH residuals, if there is one.
     pub(crate) entry: Option<i32>,
+}
+
+/// Differences in steps as components of a transform.
+pub(crate) fn projected<'t>(
+    transform: &'t Transform,
+    differences: &'t [f32],
+) -> impl Iterator<Item = f32> + 't {
+    const UNIT: f32 = 4096.0;
+    transform.rows().map(move |row| {
+        row.iter().zip(differences).map(|(&weight, difference)| f32::from(weight) / UNIT * difference).sum()
+    })
 }

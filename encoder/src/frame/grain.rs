@@ -13,6 +13,16 @@ pub(crate) struct Grain {
     pub(crate) attribute_step: [u8; 5],
 }
 
+impl Grain {
+    /// How finely changes are coded of what is coded like this: moves with half of the step, since what moves a little is seen to move, and
+    /// rotations half an octave finer.
+    pub(crate) fn of_changes(mut self) -> Self {
+        let [_, _, rotation, ..] = &mut self.attribute_step;
+        *rotation = rotation.saturating_sub(1);
+        Self { position_shift: self.position_shift.saturating_sub(1), ..self }
+    }
+}
+
 /// How finely the refinements of a sequence are coded.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Grains([Grain; MAX_REFINEMENTS as usize]);

@@ -61,14 +61,11 @@ struct Intra<'a> {
     savings: Vec<Saving>,
 }
 
-/// Codes an I frame; gives it, and the Gaussians of each list by their places in the target.
+/// Codes an I frame.
 ///
 /// # Errors
 /// What the decoder's own checks refuse.
-pub(crate) fn code_intra(
-    coder: &UnitCoder<'_>,
-    target: IntraTarget<'_>,
-) -> Result<(CodedFrame, Vec<Vec<u32>>), Error> {
+pub(crate) fn code_intra(coder: &UnitCoder<'_>, target: IntraTarget<'_>) -> Result<CodedFrame, Error> {
     let sequence = coder.sequence;
     let refinements = usize::from(sequence.refinement_count);
     let sh_planes = usize::from(sequence.sh_dimension());
@@ -98,7 +95,7 @@ pub(crate) fn code_intra(
         models: models.first,
         deviation: None,
     };
-    Ok((CodedFrame { cells: None, carried_digest: None, units, reference, savings }, members))
+    Ok(CodedFrame { cells: None, carried_digest: None, units, reference, savings })
 }
 
 impl Intra<'_> {

@@ -8,7 +8,7 @@
     reason = "positions on the grid have at most 26 bits, steps are powers of two"
 )]
 
-use super::survivors::{Aim, MOST, REMOVED};
+use super::survivors::{Aim, REMOVED};
 use splatstream_decoder::list::{FINE, GaussianList, canonical};
 use splatstream_decoder::moves::{MovePredictor, MoveSpace, Moves};
 use splatstream_format::syntax::NO_PREDICTOR;
@@ -25,6 +25,9 @@ const ROUNDS: usize = 3;
 
 /// Where more than this share of a run, in quarters, has to move, all of it is moved.
 const RUN_QUARTERS: usize = 3;
+
+/// The largest difference, steps, that is left of a coordinate that is moved.
+const LEFT: f32 = 0.7;
 
 /// Bits of a coordinate that is left as predicted, of one step, and what each doubling adds.
 const ZERO_BITS: f32 = 0.5;
@@ -65,10 +68,21 @@ impl MoveGrid {
         (place - canonical(fine) as f32) / self.size
     }
 
-    /// What brings a predicted coordinate near to where it shall be: nothing if it is left as it is.
-    fn residual(self, predicted: i32, place: f32, left: f32) -> i32 {
+    /// What brings a predicted coordinate near to where it shall be: of nothing, the nearest step and the one before it what costs
+    /// least, its bits and the error that it leaves.
+    fn residual(self, predicted: i32, place: f32) -> i32 {
         let apart = self.apart(predicted, place);
-        let wanted = if apart.abs() <= left { 0 } else { crate::grid::nearest_integer(apart) };
+        let nearest = crate::grid::nearest_integer(apart);
+        let cost = |steps: i32| {
+            let rest = apart - steps as f32;
+            rest * rest / self.price + bits_of(steps)
+        };
+        let mut wanted = nearest;
+        for steps in [0, nearest - nearest.signum()] {
+            if (apart - steps as f32).abs() <= LEFT && cost(steps) < cost(wanted) {
+                wanted = steps;
+            }
+        }
         // A fraction of a step is left between the outermost point and the end of the grid.
         wanted.clamp(-(predicted / self.step), (self.last - predicted) / self.step)
     }
@@ -89,7 +103,7 @@ pub(crate) fn plan(
 ) -> MovePlan {
     let step = FINE << shift;
     let grid = MoveGrid { step, size: (1_u32 << shift) as f32, last: ((1 << bits) - 1) * FINE, price };
-    let moved = moving(displaced, aims, grid, predicts);
+    let moved = moving((displaced, &trends(space, aims.len(), predicts)), aims, grid, predicts);
     let modes: Vec<i32> = aims
         .iter()
         .zip(&moved)
@@ -155,18 +169,23 @@ fn residual(
     let row = moves.rows()[number] as usize;
     let predicted = moves.predicted(number, predictor);
     let Some(aim) = aims[row] else { return [0; 3] };
-    let residual = [0, 1, 2].map(|axis: usize| grid.residual(predicted[axis], aim.place[axis], aim.left));
+    let residual = [0, 1, 2].map(|axis: usize| grid.residual(predicted[axis], aim.place[axis]));
     moves.set(number, [0, 1, 2].map(|axis: usize| predicted[axis] + residual[axis] * grid.step));
     residual
 }
 
 /// Which parents move: those of which a move brings more than its bits are worth and, where moves are predicted, all of
 /// runs of which most do.
-fn moving(displaced: &GaussianList, aims: &[Option<Aim>], grid: MoveGrid, predicts: bool) -> Vec<bool> {
+fn moving(
+    (displaced, trends): (&GaussianList, &[[i32; 3]]),
+    aims: &[Option<Aim>],
+    grid: MoveGrid,
+    predicts: bool,
+) -> Vec<bool> {
     let mut moved = Vec::with_capacity(aims.len());
     for (start, aims) in (0..).step_by(RUN).zip(aims.chunks(RUN)) {
         let won = |(row, aim): (usize, &Option<Aim>)| {
-            aim.map_or(f32::MIN, |aim| bargain(displaced, row, aim, grid))
+            aim.map_or(f32::MIN, |aim| bargain((displaced, trends.get(row)), row, aim, grid))
         };
         let bargains: Vec<f32> = (start..).zip(aims).map(won).collect();
         let mut moving: Vec<bool> = bargains.iter().map(|&bits| bits > 0.0).collect();
@@ -183,22 +202,38 @@ fn moving(displaced: &GaussianList, aims: &[Option<Aim>], grid: MoveGrid, predic
     moved
 }
 
-/// What a move of a parent is worth, in bits, beyond those that it takes. What is far off is moved in any case.
+/// Where parents would be if they went on as before; nothing where moves are not predicted.
+fn trends(space: &MoveSpace, parents: usize, predicts: bool) -> Vec<[i32; 3]> {
+    if !predicts {
+        return Vec::new();
+    }
+    let all = space.moves(&vec![1; parents], |_| false);
+    (0..parents).map(|number| all.predicted(number, MovePredictor::Previous)).collect()
+}
+
+/// What a move of a parent is worth, in bits, beyond those that it takes from where its cell brings it or from where it would go on
+/// to, whichever is the better. What is far off is moved in any case.
 #[expect(clippy::indexing_slicing, reason = "rows are those of the list; axes are constants")]
-fn bargain(displaced: &GaussianList, row: usize, aim: Aim, grid: MoveGrid) -> f32 {
+fn bargain(
+    (displaced, trend): (&GaussianList, Option<&[i32; 3]>),
+    row: usize,
+    aim: Aim,
+    grid: MoveGrid,
+) -> f32 {
     if !aim.moves {
         return f32::MIN;
     }
-    let of_axis = |axis: usize| {
-        let now = displaced.position_fine[axis][row];
-        let apart = grid.apart(now, aim.place[axis]);
-        let residual = grid.residual(now, aim.place[axis], aim.left);
-        let rest = apart - residual as f32;
-        (apart * apart - rest * rest) / grid.price - bits_of(residual)
+    let now = displaced.position_fine.each_ref().map(|plane| plane[row]);
+    let won = |from: &[i32; 3]| -> f32 {
+        let of_axis = |axis: usize| {
+            let (apart, place) = (grid.apart(now[axis], aim.place[axis]), aim.place[axis]);
+            let residual = grid.residual(from[axis], place);
+            let rest = grid.apart(from[axis], place) - residual as f32;
+            (apart * apart - rest * rest) / grid.price - bits_of(residual)
+        };
+        of_axis(0) + of_axis(1) + of_axis(2)
     };
-    let is_far =
-        (0..3).any(|axis| grid.apart(displaced.position_fine[axis][row], aim.place[axis]).abs() > MOST);
-    if is_far { f32::MAX } else { of_axis(0) + of_axis(1) + of_axis(2) }
+    if aim.is_far { f32::MAX } else { trend.map_or(f32::MIN, won).max(won(&now)) }
 }
 
 /// Bits by which saying that a parent moves costs more than saying that it stays, where so many of some do.

@@ -155,7 +155,8 @@ impl<'a> Predicted<'a> {
         let row_count = self.from.target.row_count;
         let span_log2 = self.from.span_log2;
         let deviation = self.from.reference.deviation.as_ref();
-        let deviation = deviation.map(|deviation| deviation.followed(&parents)).transpose()?;
+        let deviation = deviation.filter(|deviation| deviation.is_fitted);
+        let deviation = deviation.map(|deviation| deviation.followed(&parents));
         let models = models.first;
         let reference = Reference { lists, span_log2, carried, models, rows, row_count, deviation };
         Ok(CodedFrame { cells: self.cells, carried_digest, units, reference, savings: Vec::new() })
@@ -267,9 +268,10 @@ impl<'a> Predicted<'a> {
         Fresh { indices, wanted, of_list }
     }
 
-    /// How finely a list is coded.
+    /// How finely a list is coded: as in I frames where pictures decide what is sent, for they find enough as it is.
     fn grain(&self, list: usize) -> Grain {
-        self.from.coder.grains.of(list as u8)
+        let grain = self.from.coder.grains.of(list as u8);
+        if self.from.survivors.judge.is_some() { grain } else { grain.of_changes() }
     }
 
     /// A unit that decides about the parents in a list, which were added to `space` last. Without `predicts` nothing is
@@ -307,7 +309,8 @@ impl<'a> Predicted<'a> {
         let grain = self.grain(list);
         let position_shift = grain.position_shift;
         let rule = coder.steps(grain.attribute_step);
-        let parents = Parents { list: displaced, opacity, rule, position_shift };
+        let shift_of_intra = coder.grains.of(list as u8).position_shift;
+        let parents = Parents { list: displaced, opacity, rule, position_shift, shift_of_intra };
         let fates = survivors.fates(parents, range.start, &self.matching.target_of[range]);
         let aims: Vec<Option<Aim>> = fates.iter().map(|fate| fate.aim).collect();
         let bits = coder.sequence.position_bits;

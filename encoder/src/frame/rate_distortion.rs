@@ -55,12 +55,16 @@ impl Goal {
     }
 }
 
+/// What a bit of a move is worth that pictures have asked for, of what one is otherwise: it brings its Gaussian near.
+const OF_JUDGED: f32 = 0.1;
+
 impl Predicted<'_> {
     /// Sets the judge, at the highest price at which pictures are good enough, or the lowest.
     ///
     /// # Errors
     /// What the decoder's own checks refuse.
     pub(crate) fn set_judge(&mut self, goal: &mut Goal) -> Result<(), Error> {
+        self.from.survivors.price.moves *= OF_JUDGED;
         self.from.survivors.judge = Some(Judge::default());
         let everything = self.shown()?;
         let decibels = finite_psnr(&goal.pictures, &everything);

@@ -5,7 +5,8 @@
 )]
 
 use super::axis_matching::{LEFT, Namings, Pose};
-use super::difference::{Apart, COLOUR, Kept, OPACITY, ROTATION};
+use super::deviation::Deviation;
+use super::difference::{Apart, COLOUR, Kept, OPACITY, ROTATION, projected};
 use super::target::Target;
 use super::update_decision::Judge;
 use crate::grid::nearest_integer;
@@ -16,11 +17,8 @@ use splatstream_decoder::steps::{Stage, StepRule, step};
 use splatstream_format::payload::{Codebook, Transform};
 use splatstream_format::syntax::SequenceParameters;
 
-/// The largest difference, in steps, that is left of a position; of an attribute that is [`LEFT`].
-const LEFT_OF_MOVES: f32 = 0.7;
-
 /// What is sent whatever it takes: differences of more steps than this show.
-pub(crate) const MOST: f32 = 1.5;
+const MOST: f32 = 1.5;
 
 /// What a bit of a move and one of an update are worth, squared steps. Updates change more Gaussians that show for fewer
 /// bits.
@@ -60,10 +58,10 @@ fn kept(difference: f32) -> i32 {
 pub(crate) struct Aim {
     /// Grid steps.
     pub(crate) place: [f32; 3],
-    /// How far from there it may be left, steps of its moves.
-    pub(crate) left: f32,
     /// Whether it is worth a move at all.
     pub(crate) moves: bool,
+    /// Whether it is so far from its source that it moves in any case.
+    pub(crate) is_far: bool,
 }
 
 /// What becomes of a parent.
@@ -87,9 +85,17 @@ pub(crate) struct Parents<'a> {
     pub(crate) opacity: &'a [i32],
     pub(crate) rule: StepRule,
     pub(crate) position_shift: u8,
+    /// The same of I frames.
+    pub(crate) shift_of_intra: u8,
 }
 
 impl Parents<'_> {
+    /// The largest move that is left, in steps of moves: so many of I frames.
+    #[expect(clippy::arithmetic_side_effects, reason = "moves have the step of I frames or a finer one")]
+    fn farthest(&self) -> f32 {
+        MOST * (1_u32 << (self.shift_of_intra - self.position_shift)) as f32
+    }
+
     /// The opacity that updates start from.
     fn opacity(&self, row: usize) -> i32 {
         self.opacity.get(row).copied().unwrap_or(self.list.planes.opacity[row])
@@ -109,6 +115,8 @@ pub(crate) struct Survivors<'a> {
     pub(crate) judge: Option<Judge>,
     /// Without a judge, what pictures say of differences that need not be sent; none: they count by their steps.
     pub(crate) weigher: Option<Judge>,
+    /// By how much Gaussians of the reference differ from their source, if the target has kept what stays of that.
+    pub(crate) kept: Option<&'a Deviation>,
     /// The codebook of SH residuals, if they are vector quantised: the second stage, after that of whole values.
     pub(crate) book: Option<&'a Codebook>,
 }
@@ -118,7 +126,7 @@ impl Survivors<'_> {
     #[expect(clippy::arithmetic_side_effects, reason = "counts of attributes; steps are 1 or more")]
     pub(crate) fn fates(&self, parents: Parents<'_>, start: usize, partner: &[Option<u32>]) -> Vec<Fate> {
         let fate = |(row, partner): (usize, &Option<u32>)| match *partner {
-            Some(index) => self.fate(parents, row, index),
+            Some(index) => self.fate(parents, row, (start + row, index)),
             None if self.goes_on(start + row, None) => self.unchanged(parents, row),
             None => Fate::default(),
         };
@@ -133,13 +141,20 @@ impl Survivors<'_> {
     /// The fate of a parent that stays although nothing continues it.
     fn unchanged(&self, parents: Parents<'_>, row: usize) -> Fate {
         let place = parents.list.position_fine.each_ref().map(|plane| plane[row] as f32 / FINE as f32);
-        Fate { aim: Some(Aim { place, left: LEFT_OF_MOVES, moves: false }), updated: Vec::new() }
+        Fate { aim: Some(Aim { place, moves: false, is_far: false }), updated: Vec::new() }
     }
 
-    fn fate(&self, parents: Parents<'_>, row: usize, index: u32) -> Fate {
+    fn fate(&self, parents: Parents<'_>, row: usize, (from, index): (usize, u32)) -> Fate {
         let index = index as usize;
         let apart = self.apart(parents, row, index);
-        let weigher = self.weigher.as_ref().filter(|_| !apart.is_beyond(MOST));
+        // However much of an error stays, a Gaussian is left no farther from its source than that.
+        let stays = self.kept.map(|kept| kept.stays(from, self.sequence, self.dc));
+        let of_source = stays.map(|stays| apart.clone().without(&stays));
+        let of_source = of_source.as_ref().unwrap_or(&apart);
+        let is_far = of_source.is_far(parents.farthest());
+        // Not of every rotation something stays.
+        let is_unlike = of_source.is_unlike(MOST) || apart.is_unlike(MOST);
+        let weigher = self.weigher.as_ref().filter(|_| !is_far && !is_unlike);
         let judge = self.judge.as_ref().or(weigher);
         let Kept { moves, attributes, entry } = match judge {
             None => apart.all_kept(self.book),
@@ -151,12 +166,12 @@ impl Survivors<'_> {
             None => {
                 let bits = NAMED_BITS + update.bits();
                 let is_cheap = update.gain > self.price.updates * bits;
-                is_cheap || update.most > MOST || entry.is_some_and(|entry| entry != 0)
+                is_cheap || is_unlike || update.most > MOST || entry.is_some_and(|entry| entry != 0)
             }
             Some(_) => update.residuals.iter().any(|&value| value != 0),
         };
         Fate {
-            aim: Some(Aim { place, left: LEFT_OF_MOVES, moves }),
+            aim: Some(Aim { place, moves, is_far }),
             updated: if is_worth_it { update.residuals } else { Vec::new() },
         }
     }
@@ -329,12 +344,4 @@ impl Update {
         };
         self.residuals.iter().map(bits).sum()
     }
-}
-
-/// Differences in steps as components of a transform.
-fn projected<'t>(transform: &'t Transform, differences: &'t [f32]) -> impl Iterator<Item = f32> + 't {
-    const UNIT: f32 = 4096.0;
-    transform.rows().map(move |row| {
-        row.iter().zip(differences).map(|(&weight, difference)| f32::from(weight) / UNIT * difference).sum()
-    })
 }

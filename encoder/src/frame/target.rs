@@ -24,6 +24,15 @@ impl Target {
         self.position = Default::default();
     }
 
+    /// Where rows of the file are among its Gaussians.
+    pub(crate) fn places(&self, rows: &[u32]) -> Vec<Option<u32>> {
+        let mut place = vec![None; self.row_count as usize];
+        for (index, &row) in (0..).zip(&self.rows) {
+            place.get_mut(row as usize).into_iter().for_each(|place| *place = Some(index));
+        }
+        rows.iter().map(|&row| place.get(row as usize).copied().flatten()).collect()
+    }
+
     pub(crate) fn cloud(&self) -> Cloud<'_> {
         Cloud {
             position: self.position.each_ref().map(Vec::as_slice),

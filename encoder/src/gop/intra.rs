@@ -55,7 +55,7 @@ impl SpanCoder<'_> {
         if !is_predicted {
             target.forget();
         }
-        let (mut coded, members) = code_intra(
+        let mut coded = code_intra(
             &coder,
             IntraTarget {
                 chooser: Chooser { predictors, ..self.chooser() },
@@ -73,8 +73,9 @@ impl SpanCoder<'_> {
         if self.report.coded.is_empty() {
             self.report.savings.extend(coded.savings.iter().chain(&worth_of_reuse(&coded)));
         }
-        if is_predicted && fitted.as_ref().is_some_and(|fitted| fitted.is_changed) {
-            coded.reference.differs_from((&target, &members), &self.common.sequence)?;
+        if is_predicted {
+            let is_fitted = fitted.as_ref().is_some_and(|fitted| fitted.is_changed);
+            coded.reference.differs_from(&target, &self.coder(gop, None), is_fitted)?;
         }
         let reports = fitted.into_iter().flat_map(|fitted| fitted.reports);
         self.report.finetuned.extend(reports.map(|report| FinetuneReport { frame: number, ..report }));

@@ -73,6 +73,7 @@ impl SpanCoder<'_> {
             price: gop.steadiness.as_ref().map_or(BitPrice::at(1.0), Steadiness::price),
             judge: None,
             weigher: None,
+            kept: None,
             book: None,
         }
     }

@@ -35,11 +35,15 @@ impl SpanCoder<'_> {
         let Some(matching) = self.matching(reference, target, &measure) else { return Ok(Verdict::Unlike) };
         let mut goal = self.goal(gop, &matching, target);
         let source = target;
-        let fitted = reference.fitted(target, &matching, &self.coder(gop, None));
-        let target = fitted.as_ref().unwrap_or(source);
+        // Pictures decide about single frames, each by itself.
+        let follows = goal.is_none() || reference.is_fitted();
+        let followed =
+            follows.then(|| reference.followed(target, &matching, &self.coder(gop, None))).flatten();
+        let target = followed.as_ref().unwrap_or(source);
         let mut survivors = self.survivors(gop, target);
         let book = self.residual_book(gop, &survivors, reference, &matching, role.temporal_layer);
         survivors.book = book.as_ref();
+        survivors.kept = reference.rounded().filter(|_| follows);
         let cells = CellPlan {
             measure: &measure,
             marks_stale: self.common.sequence.whole_anchor(),
@@ -93,8 +97,12 @@ impl SpanCoder<'_> {
         (number, role): (u32, &FrameRole),
         goal: Option<Goal>,
         source: &Target,
-        coded: CodedFrame,
+        mut coded: CodedFrame,
     ) -> Result<(), Error> {
+        let is_kept = role.temporal_layer + 1 < self.common.settings.temporal_layers().max(2);
+        if is_kept && goal.is_none() && !coded.reference.is_fitted() {
+            coded.reference.differs_from(source, &self.coder(gop, None), false)?;
+        }
         match goal {
             Some(goal) => {
                 gop.price_level = goal.level;
@@ -106,7 +114,7 @@ impl SpanCoder<'_> {
                 }
             }
         }
-        if role.temporal_layer + 1 < self.common.settings.temporal_layers().max(2) {
+        if is_kept {
             gop.keep(role.temporal_layer, number, coded.reference);
         }
         Ok(())
