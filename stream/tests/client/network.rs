@@ -7,10 +7,10 @@ use splatstream_stream::client::{Client, Loss, Options};
 use splatstream_stream::package::{Options as Packaging, Package};
 use splatstream_stream::server::{Network, Server, Settings, Statistics, Stopper};
 use std::fs;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, TcpListener};
 use std::path::Path;
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// A server in a thread of its own, which ends with the value.
@@ -108,6 +108,16 @@ fn faults_of_the_network_are_outlasted_or_named() {
     assert!(lost > 0);
 }
 
+/// Takes the next connection to an address, and closes it: so one request fails, however slow the machine is.
+fn hang_up_once(address: SocketAddr) {
+    let listener = TcpListener::bind(address).unwrap();
+    listener.set_nonblocking(true).unwrap();
+    let begin = Instant::now();
+    while listener.accept().is_err() && begin.elapsed() < Duration::from_secs(20) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
 #[test]
 fn a_server_that_is_started_again_is_found_again() {
     let stream = mixed();
@@ -127,6 +137,7 @@ fn a_server_that_is_started_again_is_found_again() {
         let folder = folder.path().to_owned();
         restart = Some(std::thread::spawn(move || {
             std::thread::sleep(Duration::from_millis(500));
+            hang_up_once(address);
             Running::start(&folder, address, Network::default())
         }));
     });
