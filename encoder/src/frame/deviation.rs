@@ -32,11 +32,11 @@ use splatstream_gaussians::{GaussianFrame, PlanesMut};
 /// How much of a difference that nobody wanted stays in the next frame. An error counts as much as a change of it then.
 const STAYS: f32 = 0.5;
 
-/// Nothing stays of the rotation of a Gaussian whose w is smaller than the root of so many steps: with all but x, y and z left out, a part
+/// Nothing stays of the pose of a Gaussian whose w is smaller than the root of so many steps: with all but x, y and z left out, a part
 /// of a step in them is many in w, and beyond half a turn everything has the other sign.
 const NEAR_HALF_A_TURN: f32 = 5.0;
 
-/// Nor of the pose of a Gaussian that changes by more steps from one frame to the next: what changes so much does not flicker.
+/// Nor does anything of the pose of a Gaussian that changes by more steps from one frame to the next: what changes so much does not flicker.
 const MOST_CHANGED: f32 = 4.0;
 
 /// What each Gaussian of some lists differs by from its source, one list after the other.
@@ -247,5 +247,25 @@ fn unit([x, y, z]: [f32; 3]) -> [f32; 4] {
             let length = square.sqrt();
             [0.0, x / length, y / length, z / length]
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn new_gaussians_differ_by_nothing_where_there_were_none_before() {
+        let none = Deviation {
+            position: Default::default(),
+            log_scale: Default::default(),
+            rotation: Default::default(),
+            opacity: Vec::new(),
+            colours: vec![Vec::new(); 3],
+            is_fitted: true,
+        };
+        let followed = none.followed(&[None, None]);
+        assert_eq!(followed.position, [const { [0.0; 2] }; 3].map(Vec::from));
+        assert!(followed.colours.iter().all(|plane| plane == &[0.0; 2]));
     }
 }

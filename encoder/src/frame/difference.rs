@@ -14,7 +14,6 @@ pub(crate) const ROTATION: usize = 4;
 pub(crate) const COLOUR: usize = 7;
 
 /// How far a Gaussian is from its partner, in steps of the sequence.
-#[derive(Clone)]
 pub(crate) struct Apart {
     pub(crate) position: [f32; 3],
     /// Log-scales, opacity, rotation, components of dc and of sh.
@@ -43,22 +42,18 @@ impl Apart {
         self.sh().iter().map(|value| value / self.steps[4]).collect()
     }
 
-    /// Whether it is farther away than this on some axis, in steps of moves.
-    pub(crate) fn is_far(&self, most: f32) -> bool {
-        self.position.iter().any(|change| (change / self.move_step).abs() > most)
+    /// Whether it is farther away than this on some axis, in steps of moves, from where the partner was before something stayed.
+    pub(crate) fn is_far(&self, stays: &Stays, most: f32) -> bool {
+        let mut changes = self.position.iter().zip(stays.position).map(|(change, stays)| change - stays);
+        changes.any(|change| (change / self.move_step).abs() > most)
     }
 
-    /// Whether some attribute differs by more than this, in the steps that it is coded with.
-    pub(crate) fn is_unlike(&self, most: f32) -> bool {
-        let mut attributes = (0..).zip(&self.attributes);
-        attributes.any(|(attribute, change)| (change / self.step_of(attribute)).abs() > most)
-    }
-
-    /// The same to what the partner is before it keeps of an earlier difference what stays.
-    pub(crate) fn without(mut self, kept: &Stays) -> Self {
-        self.position.iter_mut().zip(kept.position).for_each(|(change, kept)| *change -= kept);
-        self.attributes.iter_mut().zip(&kept.attributes).for_each(|(change, kept)| *change -= kept);
-        self
+    /// Whether some attribute differs by more than this, in the steps that it is coded with, from what the partner had before
+    /// something stayed.
+    pub(crate) fn is_unlike(&self, stays: &Stays, most: f32) -> bool {
+        let stays = stays.attributes.iter().copied().chain(core::iter::repeat(0.0));
+        let changes = self.attributes.iter().zip(stays).map(|(change, stays)| change - stays);
+        (0..).zip(changes).any(|(attribute, change)| (change / self.step_of(attribute)).abs() > most)
     }
 
     /// All differences.
@@ -88,7 +83,8 @@ impl Apart {
     }
 }
 
-/// What a Gaussian keeps of a difference of an earlier frame, in steps of the sequence: as in [`Apart`], without sh.
+/// What stays of a difference of an earlier frame, in steps of the sequence: as in [`Apart`], but for sh, of which nothing does.
+#[derive(Default)]
 pub(crate) struct Stays {
     pub(crate) position: [f32; 3],
     pub(crate) attributes: Vec<f32>,

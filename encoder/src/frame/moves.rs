@@ -68,8 +68,8 @@ impl MoveGrid {
         (place - canonical(fine) as f32) / self.size
     }
 
-    /// What brings a predicted coordinate near to where it shall be: of nothing, the nearest step and the one before it what costs
-    /// least, its bits and the error that it leaves.
+    /// What brings a predicted coordinate near to where it shall be: nothing, the nearest step or the one before it, whichever costs
+    /// least in bits and in the error that it leaves.
     fn residual(self, predicted: i32, place: f32) -> i32 {
         let apart = self.apart(predicted, place);
         let nearest = crate::grid::nearest_integer(apart);

@@ -6,7 +6,7 @@
 
 use super::axis_matching::{LEFT, Namings, Pose};
 use super::deviation::Deviation;
-use super::difference::{Apart, COLOUR, Kept, OPACITY, ROTATION, projected};
+use super::difference::{Apart, COLOUR, Kept, OPACITY, ROTATION, Stays, projected};
 use super::target::Target;
 use super::update_decision::Judge;
 use crate::grid::nearest_integer;
@@ -148,12 +148,10 @@ impl Survivors<'_> {
         let index = index as usize;
         let apart = self.apart(parents, row, index);
         // However much of an error stays, a Gaussian is left no farther from its source than that.
-        let stays = self.kept.map(|kept| kept.stays(from, self.sequence, self.dc));
-        let of_source = stays.map(|stays| apart.clone().without(&stays));
-        let of_source = of_source.as_ref().unwrap_or(&apart);
-        let is_far = of_source.is_far(parents.farthest());
-        // Not of every rotation something stays.
-        let is_unlike = of_source.is_unlike(MOST) || apart.is_unlike(MOST);
+        let stays = self.kept.map(|kept| kept.stays(from, self.sequence, self.dc)).unwrap_or_default();
+        let is_far = apart.is_far(&stays, parents.farthest());
+        // Not of every pose something stays.
+        let is_unlike = apart.is_unlike(&stays, MOST) || apart.is_unlike(&Stays::default(), MOST);
         let weigher = self.weigher.as_ref().filter(|_| !is_far && !is_unlike);
         let judge = self.judge.as_ref().or(weigher);
         let Kept { moves, attributes, entry } = match judge {
