@@ -7,11 +7,12 @@
 use crate::block::{UnitParameters, decode_block};
 use crate::buffers::{Buffers, Workspace};
 use crate::cores;
-use crate::frame::{FrameSlice, QuantizedFrame};
+use crate::frame::{FrameSlice, PLANES, QuantizedFrame};
 use crate::increment::residual::AttributeCoding;
 use crate::increment::values::{PreparedSections, blocks_of};
 use splatstream_format::entropy::in_force::SectionModels;
 use splatstream_format::entropy::layout::Section;
+use splatstream_format::entropy::model::PlaneModel;
 use splatstream_format::entropy::reader::PlaneDecoder;
 use splatstream_format::payload::{CodedSection, Increment};
 use splatstream_format::syntax::{IncrementHeader, SequenceParameters};
@@ -58,12 +59,6 @@ pub(crate) fn decode(
     const APART: Error = Error::fault("a part of the planes for each block of a unit");
     let sections: Vec<Option<(&CodedSection<'_>, &SectionModels)>> =
         units.iter().map(|unit| unit.prepared.sections().next()).collect();
-    // What a table is made of counts like values.
-    let tables = units.iter().map(|unit| unit.prepared.tables()).fold(0, usize::saturating_add);
-    let decoders: Vec<Vec<PlaneDecoder>> =
-        cores::map(tables.saturating_mul(VALUES_OF_TABLE), sections.iter().collect(), |section| {
-            section.iter().flat_map(|(_, models)| &models.models).map(PlaneDecoder::new).collect()
-        });
     let blocks: Vec<(usize, &[u8], u64, usize)> = sections
         .iter()
         .enumerate()
@@ -74,8 +69,9 @@ pub(crate) fn decode(
         .collect();
     let lengths: Vec<usize> = blocks.iter().map(|&(.., count)| count).collect();
     let total = lengths.iter().copied().fold(0, usize::saturating_add);
-    let mut planes =
-        QuantizedFrame::zeroed_unless(workspace.interrupt, total, usize::from(sequence.sh_dimension()));
+    let sh_planes = usize::from(sequence.sh_dimension());
+    let blank = || QuantizedFrame::zeroed_unless(workspace.interrupt, total, sh_planes);
+    let (decoders, mut planes) = cores::join(total.saturating_mul(PLANES), || decoders(&sections), blank);
     let values = planes.values();
     let task = |((unit, bytes, at, _), out)| {
         let (coded, models) = sections.get(unit).copied().flatten()?;
@@ -93,6 +89,17 @@ pub(crate) fn decode(
         *slot = slot.and_then(|gaussians| block.map(|count| gaussians.saturating_add(count)));
     }
     Ok((planes, results))
+}
+
+/// The decoders of the planes of each unit.
+fn decoders(sections: &[Option<(&CodedSection<'_>, &SectionModels)>]) -> Vec<Vec<PlaneDecoder>> {
+    let of_units: Vec<&[PlaneModel]> =
+        sections.iter().map(|section| section.map_or(&[][..], |(_, models)| &models.models)).collect();
+    let all: Vec<&PlaneModel> = of_units.iter().copied().flatten().collect();
+    // What a table is made of counts like values.
+    let tables = all.iter().map(|model| model.tables.len()).fold(0, usize::saturating_add);
+    let mut all = cores::map(tables.saturating_mul(VALUES_OF_TABLE), all, PlaneDecoder::new).into_iter();
+    of_units.iter().map(|models| all.by_ref().take(models.len()).collect()).collect()
 }
 
 fn run(buffers: &mut Buffers, task: Task<'_, '_, '_>) -> (usize, Result<usize>) {

@@ -6,6 +6,7 @@
 
 use crate::cores;
 use crate::frame::QuantizedFrame;
+use crate::interrupt::Interrupt;
 use splatstream_format::syntax::SequenceParameters;
 use splatstream_gaussians::{FrameError, GaussianFrame, Planes};
 
@@ -13,6 +14,9 @@ pub use crate::companding::Companding;
 
 /// dc and sh integers are on a grid 64 times finer than their step.
 const COLOUR_FRACTION: f32 = 1.0 / 64.0;
+
+/// Gaussians of which a core finds w before it takes others.
+const RUN: usize = 1 << 14;
 
 /// The frame as Gaussians in PLY's domain. The planes of integers become the planes of f32: no third copy of a
 /// frame is ever held.
@@ -30,32 +34,36 @@ pub fn to_gaussians(
     // In the order in which they are taken out below.
     let shapes = log_scale.map(|plane| (plane, Some(sequence.log_scale_offset()), sequence.log_scale_step()));
     let opacities = [(opacity, Some(sequence.opacity_offset()), sequence.opacity_step())];
+    let turns = rotation.map(|plane| (plane, None, sequence.rotation_step()));
     let colours = dc.map(|plane| (plane, None, dc_step));
     let harmonics = sh.into_iter().map(|plane| (plane, None, sh_step));
     let integers: Vec<(Vec<i32>, Option<f32>, f32)> =
-        shapes.into_iter().chain(opacities).chain(colours).chain(harmonics).collect();
-    let place = || (scene_positions(position, sequence), rotations(rotation, sequence));
+        shapes.into_iter().chain(opacities).chain(turns).chain(colours).chain(harmonics).collect();
+    let place = || scene_positions(values, position, sequence);
     let convert = || cores::map(values, integers, |(plane, offset, step)| affine(plane, offset, step));
-    let ((position, rotation), planes) = cores::join(values, place, convert);
+    let (position, planes) = cores::join(values, place, convert);
     let mut planes = planes.into_iter();
     // As many as were put in. One that was missing would be empty, and the frame refused for its lengths.
     let mut next = || planes.next().unwrap_or_default();
     let log_scale = [next(), next(), next()];
     let opacity_logit = next();
+    let [x, y, z] = [next(), next(), next()];
+    let rotation = [unit_w(values, &x, &y, &z), x, y, z];
     let dc = [next(), next(), next()];
     let planes = Planes { position, log_scale, rotation, opacity_logit, dc, sh: planes.collect() };
     let frame = GaussianFrame::from_planes(sequence.sh_degree, planes)?;
     Ok(frame.with_antialiased(sequence.antialiased()))
 }
 
-fn scene_positions(position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 3] {
+fn scene_positions(values: usize, position: [Vec<u32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 3] {
     let (step, companding) = (sequence.position_step(), Companding::new(sequence));
-    let [x, y, z] = position;
-    let [of_x, of_y, of_z] = sequence.position_offset();
-    [(x, of_x), (y, of_y), (z, of_z)].map(|(plane, offset)| match companding.is_linear() {
+    let axes = position.into_iter().zip(sequence.position_offset()).collect();
+    let axis = |(plane, offset): (Vec<u32>, f32)| match companding.is_linear() {
         true => plane.into_iter().map(|q| offset + step * q as f32).collect(),
         false => plane.into_iter().map(|q| offset + step * companding.expand(q) as f32).collect(),
-    })
+    };
+    let mut axes = cores::map(values, axes, axis).into_iter();
+    [(); 3].map(|()| axes.next().unwrap_or_default())
 }
 
 // Once in modules for web pages, which has two callers and takes as long as the plane does.
@@ -67,17 +75,16 @@ fn affine(plane: Vec<i32>, offset: Option<f32>, step: f32) -> Vec<f32> {
     }
 }
 
-fn rotations(rotation: [Vec<i32>; 3], sequence: &SequenceParameters) -> [Vec<f32>; 4] {
-    let [x, y, z] = rotation.map(|plane| affine(plane, None, sequence.rotation_step()));
-    [unit_w(&x, &y, &z), x, y, z]
-}
-
 /// w is what makes the quaternion a unit, 0 if x, y, z are already longer than one.
-fn unit_w(x: &[f32], y: &[f32], z: &[f32]) -> Vec<f32> {
-    let of = |((&x, &y), &z): ((&f32, &f32), &f32)| {
-        // A choice: WebAssembly has the greater of two by a call.
-        let rest = 1.0 - (x * x + y * y + z * z);
-        if rest > 0.0 { rest.sqrt() } else { 0.0 }
-    };
-    x.iter().zip(y).zip(z).map(of).collect()
+fn unit_w(values: usize, x: &[f32], y: &[f32], z: &[f32]) -> Vec<f32> {
+    let mut whole = x.to_vec();
+    let parts = whole.chunks_mut(RUN).zip(y.chunks(RUN)).zip(z.chunks(RUN));
+    cores::for_each(Interrupt::NEVER, values, parts, |((x, y), z)| {
+        for ((x, y), z) in x.iter_mut().zip(y).zip(z) {
+            // A choice: WebAssembly has the greater of two by a call.
+            let rest = 1.0 - (*x * *x + y * y + z * z);
+            *x = if rest > 0.0 { rest.sqrt() } else { 0.0 };
+        }
+    });
+    whole
 }
