@@ -54,7 +54,13 @@ const MOST_FOR_PSNR: usize = 4;
 const MOST_FOR_SIZE: usize = 6;
 
 /// Frames of a sequence on which sizes are tried: with one or two temporal layers, and with more.
-const PART: [u32; 2] = [5, 9];
+const PART_FOR_SIZE: [u32; 2] = [5, 9];
+
+/// Frames of a sequence on which a PSNR is tried, at most: errors grow from frame to frame for about so long.
+const PART_FOR_PSNR: u32 = 9;
+
+/// By how much the PSNR of such a part is lower for each frame after its first, decibels: in most sequences at least.
+const DRIFT: f64 = 0.0375;
 
 /// Encodes so that the quality or the size of the settings is reached, as far as it can be.
 ///
@@ -307,21 +313,28 @@ impl<'a> Seeker<'a> {
         Ok(fitted)
     }
 
-    /// What to fit for pictures of a PSNR. Of a sequence its first frames are tried: one of each type. What will be fitted to
-    /// photographs is tried as it is before that.
+    /// What to fit for pictures of a PSNR. Of a sequence its first frames are tried. What will be fitted to photographs is tried
+    /// as it is before that.
     fn steps_for(&mut self, wanted: f64) -> Result<Found, Error> {
         let mut secant = Secant::new(wanted + ABOVE, NEAR_DECIBELS, 1.0, MOST_FOR_PSNR);
-        let frames_of_part = match self.fitting.settings.temporal_layers() {
-            0 => 1,
-            layers => 1 + (1 << (layers - 1)),
-        };
+        let settings = self.fitting.settings;
+        // No more than a GOP has, and one where none is predicted from others.
+        let frames_of_part =
+            if settings.temporal_layers() == 0 { 1 } else { PART_FOR_PSNR.min(settings.gop) };
+        let predicted = frames_of_part.min(self.source.len()).saturating_sub(1);
+        let mut drift = DRIFT * f64::from(predicted);
         let in_part = self.source.len() > frames_of_part || self.fitting.leaves_source();
         let mut best: Option<Found> = None;
-        // The PSNR that was measured first.
+        // What was fitted for first, and the PSNR that was measured.
         let mut start = None;
-        let mut next = Some(wanted - self.fitting.gain());
+        let mut next = Some(wanted + drift - self.fitting.gain());
         while let Some(at) = next {
             let encoded = if in_part { self.part(at, frames_of_part)? } else { self.kept(at)? };
+            if drift > 0.0 && !is_predicted(&encoded.report) {
+                // Nothing drifts.
+                next = Some(at - core::mem::take(&mut drift));
+                continue;
+            }
             // Where nothing can be seen nothing is too bad.
             let measured = encoded.report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr());
             let measured = measured.unwrap_or(wanted);
@@ -329,9 +342,9 @@ impl<'a> Seeker<'a> {
             if self.fitting.gives_up_codebook(&encoded.report, wanted + ABOVE - measured) {
                 continue;
             }
-            let first = *start.get_or_insert(measured);
+            let (from, first) = *start.get_or_insert((at, measured));
             // Something else than the steps spoils the pictures: finer ones would only cost bits.
-            if at > wanted && measured - first < LEAST_GAIN * (at - wanted) {
+            if at > from && measured - first < LEAST_GAIN * (at - from) {
                 break;
             }
             if secant.take(at, measured) {
@@ -348,7 +361,7 @@ impl<'a> Seeker<'a> {
             Size::BitsPerGaussian(bits) => bits,
             Size::Bytes(bytes) => bytes as f64,
         });
-        let (frames, frames_of_part) = (self.source.len(), self.frames_of_part());
+        let (frames, frames_of_part) = (self.source.len(), self.frames_of_part_for_size());
         let (mut first, mut slope) = (FIRST, GROWTH);
         if frames > 2 * frames_of_part {
             let mut secant = Secant::new(goal, NEAR_SIZE, slope, MOST_FOR_SIZE);
@@ -374,8 +387,8 @@ impl<'a> Seeker<'a> {
         best.ok_or(Error::NoFrames)
     }
 
-    fn frames_of_part(&self) -> u32 {
-        let [few_layers, many_layers] = PART;
+    fn frames_of_part_for_size(&self) -> u32 {
+        let [few_layers, many_layers] = PART_FOR_SIZE;
         if self.fitting.settings.temporal_layers() > 2 { many_layers } else { few_layers }
     }
 
@@ -434,6 +447,11 @@ impl<'a> Seeker<'a> {
 fn gained(report: &Report) -> f64 {
     let gains = report.finetuned.iter().map(|fitted| fitted.psnr[1] - fitted.psnr[0]);
     gains.min_by(f64::total_cmp).unwrap_or(0.0)
+}
+
+/// Whether any frame refers to another.
+fn is_predicted(report: &Report) -> bool {
+    report.coded.iter().any(|frame| frame.frame_type != FrameType::Intra)
 }
 
 /// Whether a single frame may be as good without fitting.
