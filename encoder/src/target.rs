@@ -317,10 +317,7 @@ impl<'a> Seeker<'a> {
     /// as it is before that.
     fn steps_for(&mut self, wanted: f64) -> Result<Found, Error> {
         let mut secant = Secant::new(wanted + ABOVE, NEAR_DECIBELS, 1.0, MOST_FOR_PSNR);
-        let settings = self.fitting.settings;
-        // No more than a GOP has, and one where none is predicted from others.
-        let frames_of_part =
-            if settings.temporal_layers() == 0 { 1 } else { PART_FOR_PSNR.min(settings.gop) };
+        let frames_of_part = self.frames_of_part_for_psnr();
         let predicted = frames_of_part.min(self.source.len()).saturating_sub(1);
         let mut drift = DRIFT * f64::from(predicted);
         let in_part = self.source.len() > frames_of_part || self.fitting.leaves_source();
@@ -387,6 +384,12 @@ impl<'a> Seeker<'a> {
         best.ok_or(Error::NoFrames)
     }
 
+    /// No more than a GOP has, and one where none is predicted from others.
+    fn frames_of_part_for_psnr(&self) -> u32 {
+        let settings = self.fitting.settings;
+        if settings.temporal_layers() == 0 { 1 } else { PART_FOR_PSNR.min(settings.gop) }
+    }
+
     fn frames_of_part_for_size(&self) -> u32 {
         let [few_layers, many_layers] = PART_FOR_SIZE;
         if self.fitting.settings.temporal_layers() > 2 { many_layers } else { few_layers }
@@ -401,7 +404,7 @@ impl<'a> Seeker<'a> {
                 || part.coded.iter().filter(|f| (f.frame_type == FrameType::Intra) == is_first).map(value);
             of().sum::<f64>() / of().count().max(1) as f64
         };
-        let gops = match part.coded.iter().any(|frame| frame.frame_type != FrameType::Intra) {
+        let gops = match is_predicted(part) {
             true => (frames / f64::from(self.fitting.settings.gop)).ceil().min(frames),
             false => frames,
         };
