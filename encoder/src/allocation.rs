@@ -3,8 +3,8 @@
 //! Quantising one attribute with step s costs a squared error of about k·s², and a halved step about n bits
 //! more. The sum of errors that is allowed then costs least where every attribute's share of it is in proportion
 //! to its n. Both are estimated on a sample of the Gaussians: k from what pictures [show](crate::sensitivity) of each, n
-//! by counting symbols. From there k is measured, but for the fast preset, and in the end what all attributes together do
-//! to pictures: by drawing [strips](crate::strips) of a few views.
+//! by counting symbols. From there k is measured, and in the end what all attributes together do to pictures: by drawing
+//! [strips](crate::strips) of a few views.
 #![expect(
     clippy::indexing_slicing,
     reason = "rows are those of the frame that all planes are of; parts and axes are constants"
@@ -38,24 +38,19 @@ const VIEWS: u32 = 4;
 const EVERY: u32 = 8;
 /// Views in which attributes are measured alone: shares need not be exact.
 const ALONE: usize = 2;
-/// Frames of fewer Gaussians are measured so for the fast preset too.
-const FEW: usize = 1 << 12;
 /// Gaussians whose symbols are counted and whose errors are estimated; for the fast preset.
 const SAMPLE: usize = 1 << 14;
 const SAMPLE_FAST: usize = 1 << 12;
 /// How often shares are estimated: the first steps are those of an average scene.
 const ROUNDS: usize = 2;
-/// How often all of them together are made finer or coarser as estimates say.
-const LEVELS: usize = 2;
 /// How often pictures are measured, at most, and how near is near enough, dB: a stream that misses by more than half a decibel
 /// costs another encoding.
 const CORRECTIONS: usize = 6;
 const NEAR: f64 = 0.2;
-/// The same where nothing is measured before.
-const NEAR_GUESSED: f64 = 0.3;
-/// What pictures gain where steps are fitted for a decibel more: of most scenes, and where estimates alone are near.
+/// The same for the fast preset.
+const NEAR_FAST: f64 = 0.3;
+/// What pictures of most scenes gain where steps are fitted for a decibel more.
 const SLOPE: f64 = 1.0;
-const SLOPE_GUESSED: f64 = 0.85;
 /// Magnitudes of log-scales and opacities beyond which they are mistakes, and not for steps to follow.
 const USUAL: [f32; 2] = [24.0, 100.0];
 /// What halving all steps brings.
@@ -75,11 +70,6 @@ fn towards(decibels: f32, now: f64, steps: Steps) -> Steps {
     if now.is_finite() { finer(steps, f64::from(decibels) - now) } else { steps }
 }
 
-/// The PSNR of a mean squared error, decibels.
-fn psnr_of(error: f64) -> f64 {
-    -10.0 * libm::log10(error)
-}
-
 /// What is measured of a frame to fit steps to a quality.
 pub(crate) struct Fit {
     pub(crate) scene: Scene,
@@ -90,15 +80,13 @@ pub(crate) struct Fit {
     pub(crate) bases: [Components; 2],
     /// The source as the views show it that quality is measured in.
     views: Vec<StripView>,
-    /// The source as those views show it in which attributes are measured alone.
-    alone: Vec<StripView>,
+    /// The source as those views show it in which attributes are measured alone, if these are others.
+    apart: Vec<StripView>,
     /// Whether these views hold their Gaussians.
     is_held: bool,
     /// Some of the Gaussians, and which these are.
     pub(crate) sample: (GaussianFrame, Vec<u32>),
     sensitivity: Sensitivity,
-    /// See [`Ranked::level`].
-    level: f64,
 }
 
 impl Fit {
@@ -134,12 +122,14 @@ impl Fit {
             settings: Settings { laws, ..settings.clone() },
             refinement,
             sensitivity: Sensitivity::new(&sample, shown, &cameras),
-            level: ranked.level,
+            apart: match (settings.preset, whole) {
+                (Preset::Fast, None) => Vec::new(),
+                _ => apart(frame, cameras),
+            },
             views: match whole {
                 Some(whole) => views.beside(frame, whole),
                 None => views.of(frame, 0..views.len()),
             },
-            alone: alone(frame, cameras, settings),
             is_held: true,
             sample: (sample, rows),
         }
@@ -217,10 +207,10 @@ impl Fit {
     ) -> Result<(Steps, Option<f64>), Error> {
         if !self.is_held {
             let frame = again()?;
-            self.views.iter_mut().chain(&mut self.alone).for_each(|view| view.hold(&frame));
+            self.views.iter_mut().chain(&mut self.apart).for_each(|view| view.hold(&frame));
         }
         let found = self.found(decibels);
-        self.views.iter_mut().chain(&mut self.alone).for_each(StripView::let_go);
+        self.views.iter_mut().chain(&mut self.apart).for_each(StripView::let_go);
         self.is_held = false;
         found
     }
@@ -232,18 +222,11 @@ impl Fit {
             let errors = self.estimated(&steps)?;
             steps = self.allocated(&steps, errors);
         }
-        if self.alone.is_empty() {
-            // What a decibel more takes is not the same everywhere.
-            for _ in 0..LEVELS {
-                steps = towards(decibels, self.expected(&self.estimated(&steps)?), steps);
-            }
-        } else {
-            // Shares are those of steps near the ones that are looked for: a few views tell that well enough.
-            let now = self.psnr_in(&self.alone, &steps)?;
-            steps = towards(decibels, now.unwrap_or(decibels.into()), steps);
-            let errors = self.measured(&steps)?;
-            steps = self.allocated(&steps, errors);
-        }
+        // Shares are those of steps near the ones that are looked for: a few views tell that well enough.
+        let now = self.psnr_in(self.alone(), &steps)?;
+        steps = towards(decibels, now.unwrap_or(decibels.into()), steps);
+        let errors = self.measured(&steps)?;
+        steps = self.allocated(&steps, errors);
         self.levelled(steps, decibels.into())
     }
 
@@ -251,9 +234,8 @@ impl Fit {
     ///
     /// Values that lie on a grid already leap where steps pass its own: what is found is looked at before it is taken.
     fn levelled(&self, steps: Steps, decibels: f64) -> Result<(Steps, Option<f64>), Error> {
-        let is_guessed = self.alone.is_empty();
-        let (near, slope) = if is_guessed { (NEAR_GUESSED, SLOPE_GUESSED) } else { (NEAR, SLOPE) };
-        let mut secant = Secant::new(decibels, near, slope, CORRECTIONS);
+        let near = if self.settings.preset == Preset::Fast { NEAR_FAST } else { NEAR };
+        let mut secant = Secant::new(decibels, near, SLOPE, CORRECTIONS);
         let mut best = (steps, None);
         let mut next = Some(decibels);
         while let Some(at) = next {
@@ -287,10 +269,12 @@ impl Fit {
         }))
     }
 
-    /// The PSNR that estimated errors let expect, decibels; of a scene without any it is no number.
-    fn expected(&self, errors: &[f64; 6]) -> f64 {
-        let of_all = self.refinement.len() as f64 / self.sample.1.len() as f64;
-        self.level + psnr_of(errors.iter().sum::<f64>() * of_all)
+    /// The views that attributes are measured alone in: of those of the fit the one in the middle, if there are no others.
+    fn alone(&self) -> &[StripView] {
+        match self.apart.as_slice() {
+            [] => self.views.chunks(1).nth(self.views.len() / 2).unwrap_or_default(),
+            apart => apart,
+        }
     }
 
     /// The squared error of pictures with each attribute alone on its grid, estimated.
@@ -304,8 +288,9 @@ impl Fit {
     /// The same as strips of a few views show it.
     fn measured(&self, steps: &Steps) -> Result<[f64; 6], Error> {
         let grids = self.grids(self.laws(), steps);
-        let views = self.alone.iter();
-        let trials: Vec<Trial<'_>> = views.map(|view| Trial::new(&grids, &view.frame, &view.rows)).collect();
+        let views = self.alone();
+        let trials: Vec<Trial<'_>> =
+            views.iter().map(|view| Trial::new(&grids, &view.frame, &view.rows)).collect();
         let mut errors = [0.0; 6];
         for (error, attribute) in errors.iter_mut().zip(ATTRIBUTES) {
             if attribute == Attribute::Sh && self.sample.0.sh_degree() == 0 {
@@ -313,7 +298,7 @@ impl Fit {
             }
             let of_view =
                 |(view, trial): (&StripView, &Trial<'_>)| Ok(view.psnr(&trial.decoded(&[attribute])?));
-            let decibels = mean(self.alone.iter().zip(&trials).map(of_view))?;
+            let decibels = mean(views.iter().zip(&trials).map(of_view))?;
             *error = decibels.map_or(0.0, |decibels| libm::pow(10.0, -0.1 * decibels));
         }
         Ok(errors)
@@ -335,12 +320,8 @@ impl Fit {
     }
 }
 
-/// What attributes are measured alone in: nothing for the fast preset, unless there are so few Gaussians that estimates are
-/// poor and pictures cost little.
-fn alone(frame: &GaussianFrame, cameras: Vec<Camera>, settings: &Settings) -> Vec<StripView> {
-    if settings.preset == Preset::Fast && frame.len() >= FEW {
-        return Vec::new();
-    }
+/// Views that attributes are measured alone in.
+fn apart(frame: &GaussianFrame, cameras: Vec<Camera>) -> Vec<StripView> {
     // Views made for a scene rise from below to above: not the first of them.
     let first = usize::from(cameras.len() > 1);
     let apart = cameras.len().div_ceil(ALONE).max(1);

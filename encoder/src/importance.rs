@@ -20,14 +20,7 @@ pub(crate) struct Ranked {
     pub(crate) order: Vec<u32>,
     /// By Gaussian; empty where no views were needed.
     pub(crate) shown: Vec<Worth>,
-    /// The PSNR of pictures is about so much, decibels, where errors that are estimated from what is shown sum up to 1.
-    pub(crate) level: f64,
 }
-
-/// By how much pictures of real scenes near 50 dB are better than sums of estimated errors let expect, decibels, where it is not
-/// known what hides a Gaussian, and where it is: errors of Gaussians that overlap add up.
-const BETTER_UNHIDDEN: f64 = 5.2;
-const BETTER_HIDDEN: f64 = -4.0;
 
 /// Orders the frames of a sequence, most important Gaussian first.
 #[derive(Clone)]
@@ -105,9 +98,9 @@ impl Ranking {
         let mut ranked = self.ranked(frame);
         if ranked.shown.is_empty() {
             self.cameras(frame);
-            (ranked.shown, ranked.level) = match self.preset {
-                Preset::Fast => self.unhidden(frame),
-                Preset::Balanced | Preset::Small => (self.views(frame).worth(), self.level()),
+            ranked.shown = match self.preset {
+                Preset::Fast => unhidden(frame, &self.cameras),
+                Preset::Balanced | Preset::Small => self.views(frame).worth(),
             };
         }
         self.known_order = Some(ranked.order.clone());
@@ -131,8 +124,8 @@ impl Ranking {
         }
         self.cameras(frame);
         if self.importance == Importance::Footprint {
-            let (shown, level) = self.unhidden(frame);
-            return Ranked { order: thinned(frame, &shown), shown, level };
+            let shown = unhidden(frame, &self.cameras);
+            return Ranked { order: Thinning::new(frame).leave(&shown, 0), shown };
         }
         let views = self.views(frame);
         let shown = views.worth();
@@ -140,28 +133,7 @@ impl Ranking {
             Importance::Removal => self.eliminate(views, frame, &shown),
             _ => ranked(&shown.iter().map(|worth| worth.contribution).collect::<Vec<_>>(), frame),
         };
-        Ranked { order, shown, level: self.level() }
-    }
-
-    /// What pictures would show of Gaussians if no other hid them, and its [level](Ranked::level).
-    ///
-    /// Behind Gaussians that cover a picture so many times, of which each passes on what it does not cover, about that much of the
-    /// squared light is left on the mean of the way.
-    fn unhidden(&self, frame: &GaussianFrame) -> (Vec<Worth>, f64) {
-        let shown = unhidden(frame, &self.cameras);
-        // What is shown is a mean of the cameras.
-        let pixels = pixels(&self.cameras) / self.cameras.len().max(1) as f64;
-        let covered: f64 = shown.iter().map(|worth| worth.contribution).sum();
-        let times = 2.0 * core::f64::consts::TAU * covered / pixels.max(1.0);
-        let left = if times > 0.0 { -libm::expm1(-times) / times } else { 1.0 };
-        (shown, BETTER_UNHIDDEN + of_pixels(pixels) - 10.0 * libm::log10(left))
-    }
-
-    /// See [`Ranked::level`]; of the views that orders go by.
-    fn level(&self) -> f64 {
-        let (cameras, lines) = self.small();
-        let small = |camera: &Camera| camera.scaled_to_height(lines.min(camera.height));
-        BETTER_HIDDEN + of_pixels(pixels(&cameras.iter().map(small).collect::<Vec<_>>()))
+        Ranked { order, shown }
     }
 
     /// A frame follows that is coded by itself. Its views are those of the sequence, so that orders do not change from I frame
@@ -244,12 +216,6 @@ impl Ranking {
 /// Of what a Gaussian would show if nothing hid it, about so much is lost where only that one is missing: others overlap it.
 const OVERLAPPED: f64 = 0.1;
 
-/// The Gaussians of a frame, most important first, by what is [shown](unhidden) of them if nothing hides them.
-fn thinned(frame: &GaussianFrame, shown: &[Worth]) -> Vec<u32> {
-    let missed = |worth: &Worth| Worth { loss: OVERLAPPED * worth.energy, ..*worth };
-    Thinning::new(frame).leave(&shown.iter().map(missed).collect::<Vec<_>>(), 0)
-}
-
 /// Views all around stand apart by less than this part of their distance to what they show, if they show the same.
 const MOVED: f32 = 0.25;
 /// And one is no farther away than so many times the other.
@@ -279,16 +245,6 @@ fn middle(cameras: &[Camera]) -> [f32; 3] {
     sum.map(|axis: f32| axis / cameras.len().max(1) as f32)
 }
 
-/// Pixels of pictures.
-fn pixels(cameras: &[Camera]) -> f64 {
-    cameras.iter().map(|camera| f64::from(camera.width) * f64::from(camera.height)).sum()
-}
-
-/// The PSNR of so many pixels, decibels, whose squared errors sum up to 1: squares of three channels.
-fn of_pixels(pixels: f64) -> f64 {
-    10.0 * libm::log10(3.0 * pixels.max(1.0))
-}
-
 /// What pictures would show of each Gaussian if no other hid it: from its opacity, and from the pixels that it covers.
 ///
 /// The low-pass filter of a renderer widens what is smaller than a pixel, and with antialiasing fades it by as much. It is that
@@ -308,7 +264,7 @@ pub(crate) fn unhidden(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> 
         let kept = if frame.antialiased() { (across * along).sqrt() / area } else { 1.0 };
         let opacity = kept / (1.0 + libm::expf(-frame.opacity_logit()[row]));
         let [contribution, energy] = [opacity * area, opacity * opacity * area].map(f64::from);
-        Worth { contribution, loss: energy, energy }
+        Worth { contribution, loss: OVERLAPPED * energy, energy }
     };
     let arch = pulp::Arch::new();
     let mut shown = vec![Worth::default(); frame.len()];

@@ -34,10 +34,8 @@ const OPACITY_POWER: f32 = 0.2;
 const ANISOTROPY_POWER: f32 = 0.5;
 /// The power of what pictures show of the Gaussians of a refinement.
 const ENERGY_POWER: f64 = 0.23;
-/// Gaussians of a refinement are coarser by no more than this, half octaves: views from elsewhere may show them.
-const MOST_COARSER: f64 = 5.0;
 /// What pictures show of a Gaussian at least, of what those of the first refinement show on average: hidden ones are
-/// hidden in the views at hand.
+/// hidden in the views at hand, and others may show them. No refinement is coarser by more than 8 half octaves for it.
 const LEAST_ENERGY: f64 = 1e-5;
 
 /// How steps follow from what is known of a Gaussian. All of them are as asked for where nothing else is said.
@@ -166,7 +164,7 @@ fn coarser(order: &[u32], shown: &[Worth], refinements: &[u8]) -> [u8; MAX_REFIN
         let logs: Vec<f64> = rows.par_iter().map(|row| libm::log2(of_row(row).max(least))).collect();
         let log = logs.iter().sum::<f64>() / count;
         let &mut (_, of_first) = first.get_or_insert((mean, log));
-        *slot = libm::round((2.0 * ENERGY_POWER * (of_first - log)).clamp(0.0, MOST_COARSER)) as u8;
+        *slot = libm::round((2.0 * ENERGY_POWER * (of_first - log)).max(0.0)) as u8;
     }
     coarser
 }
@@ -181,7 +179,7 @@ mod tests {
         let shown: Vec<Worth> =
             energies.into_iter().map(|energy| Worth { energy, ..Worth::default() }).collect();
         let order: Vec<u32> = (0..100).collect();
-        let expected = [0, 4, 5, 0, 0, 0, 0, 0, 0, 0];
+        let expected = [0, 4, 8, 0, 0, 0, 0, 0, 0, 0];
         assert_eq!(coarser(&order, &shown, &[50, 80, 100]), expected);
     }
 
