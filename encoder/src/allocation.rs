@@ -324,8 +324,8 @@ impl Fit {
 fn apart(frame: &GaussianFrame, cameras: Vec<Camera>) -> Vec<StripView> {
     // Views made for a scene rise from below to above: not the first of them.
     let first = usize::from(cameras.len() > 1);
-    let apart = cameras.len().div_ceil(ALONE).max(1);
-    let places = (first..cameras.len()).step_by(apart).take(ALONE);
+    let stride = cameras.len().div_ceil(ALONE).max(1);
+    let places = (first..cameras.len()).step_by(stride).take(ALONE);
     StripViews::new(cameras, EVERY, frame).of(frame, places)
 }
 
