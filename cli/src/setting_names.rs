@@ -111,7 +111,7 @@ pub(crate) enum ImportanceName {
     Removal,
     /// Transmittance times alpha over the pixels of all views.
     Contribution,
-    /// Opacity and the pixels covered, mean of all views, whatever hides it, weighed again as neighbours go; needs no pictures.
+    /// Opacity, the pixels covered and an estimate of the light that reaches it, mean of all views, weighed again as neighbours go; needs no pictures.
     Footprint,
     /// Opacity times volume; needs no views.
     Volume,

@@ -1,17 +1,18 @@
 //! Which Gaussians come first.
 
+mod footprint;
 mod thinning;
 
-use crate::frame::visible_difference::Pixels;
+pub(crate) use footprint::unhidden;
+
 use crate::settings::{Importance, Preset, Settings};
-use crate::verification::HEIGHT;
+use footprint::footprint;
 use rayon::prelude::*;
 use splatstream_format::syntax::prefix_length;
 use splatstream_gaussians::{GaussianFrame, importance};
 use splatstream_render::Camera;
 use splatstream_render::camera::{Up, spiral};
 use splatstream_render::contribution::{SmallViews, Worth};
-use splatstream_render::rasterise::LOW_PASS;
 use thinning::Thinning;
 
 /// The Gaussians of a frame, most important first, and what pictures show of them.
@@ -99,7 +100,7 @@ impl Ranking {
         if ranked.shown.is_empty() {
             self.cameras(frame);
             ranked.shown = match self.preset {
-                Preset::Fast => unhidden(frame, &self.cameras),
+                Preset::Fast => self.footprint(frame),
                 Preset::Balanced | Preset::Small => self.views(frame).worth(),
             };
         }
@@ -124,7 +125,7 @@ impl Ranking {
         }
         self.cameras(frame);
         if self.importance == Importance::Footprint {
-            let shown = unhidden(frame, &self.cameras);
+            let shown = self.footprint(frame);
             return Ranked { order: Thinning::new(frame).leave(&shown, 0), shown };
         }
         let views = self.views(frame);
@@ -171,10 +172,16 @@ impl Ranking {
         SmallViews::new(frame, &cameras, lines)
     }
 
+    /// What these pictures would show, estimated.
+    fn footprint(&self, frame: &GaussianFrame) -> Vec<Worth> {
+        let (cameras, lines) = self.small();
+        footprint(frame, &cameras.iter().map(|camera| camera.scaled_to_height(lines)).collect::<Vec<_>>())
+    }
+
     /// These cameras, and the lines of the pictures.
     fn small(&self) -> (Vec<Camera>, u32) {
         let (most, lines) = match self.preset {
-            Preset::Fast => (3, 96),
+            Preset::Fast => (6, 96),
             Preset::Balanced | Preset::Small => (10, 144),
         };
         let stride = self.cameras.len().div_ceil(most).max(1);
@@ -213,9 +220,6 @@ impl Ranking {
     }
 }
 
-/// Of what a Gaussian would show if nothing hid it, about so much is lost where only that one is missing: others overlap it.
-const OVERLAPPED: f64 = 0.1;
-
 /// Views all around stand apart by less than this part of their distance to what they show, if they show the same.
 const MOVED: f32 = 0.25;
 /// And one is no farther away than so many times the other.
@@ -243,41 +247,6 @@ fn middle(cameras: &[Camera]) -> [f32; 3] {
         [x + a, y + b, z + c]
     });
     sum.map(|axis: f32| axis / cameras.len().max(1) as f32)
-}
-
-/// What pictures would show of each Gaussian if no other hid it: from its opacity, and from the pixels that it covers.
-///
-/// The low-pass filter of a renderer widens what is smaller than a pixel, and with antialiasing fades it by as much. It is that
-/// of pictures of as many lines as quality is measured in, whatever the cameras have.
-#[expect(clippy::indexing_slicing, reason = "rows are those of the frame; axes are constants")]
-#[expect(clippy::arithmetic_side_effects, reason = "places in what is in memory")]
-pub(crate) fn unhidden(frame: &GaussianFrame, cameras: &[Camera]) -> Vec<Worth> {
-    let lines = cameras.iter().map(|camera| camera.height as f32).sum::<f32>() / cameras.len().max(1) as f32;
-    let filter = LOW_PASS * (lines / HEIGHT as f32).powi(2);
-    let of_row = |(row, pixel): (usize, &f32)| {
-        let [a, b, c] = frame.log_scale().each_ref().map(|plane| plane[row]);
-        let largest = a.max(b).max(c);
-        let middle = a.max(b).min(a.min(b).max(c));
-        let pixel = pixel.max(f32::MIN_POSITIVE);
-        let [across, along] = [middle, largest].map(|scale| libm::expf(2.0 * scale) / (pixel * pixel));
-        let area = ((across + filter) * (along + filter)).sqrt();
-        let kept = if frame.antialiased() { (across * along).sqrt() / area } else { 1.0 };
-        let opacity = kept / (1.0 + libm::expf(-frame.opacity_logit()[row]));
-        let [contribution, energy] = [opacity * area, opacity * opacity * area].map(f64::from);
-        Worth { contribution, loss: OVERLAPPED * energy, energy }
-    };
-    let arch = pulp::Arch::new();
-    let mut shown = vec![Worth::default(); frame.len()];
-    shown.par_chunks_mut(AT_ONCE).enumerate().for_each(|(chunk, shown)| {
-        let first = chunk * AT_ONCE;
-        let position = frame.position().each_ref().map(|plane| &plane[first..first + shown.len()]);
-        let mut pixels = [0.0; AT_ONCE];
-        let pixels = &mut pixels[..shown.len()];
-        arch.dispatch(Pixels { position, cameras, pixels });
-        let rows = (first..).zip(&*pixels);
-        shown.iter_mut().zip(rows).for_each(|(shown, row)| *shown = of_row(row));
-    });
-    shown
 }
 
 /// Gaussians that are looked at together.

@@ -87,8 +87,8 @@ pub enum Importance {
     Removal,
     /// Transmittance times alpha, summed over the pixels of all views.
     Contribution,
-    /// The same of what views would show if no Gaussian hid another: opacity and the pixels that it covers, means of the views. No
-    /// picture is drawn.
+    /// Opacity and the pixels that a Gaussian covers, means of the views, as far as those before it let light through, which is
+    /// estimated. No picture is drawn.
     Footprint,
     /// Opacity times volume: the paper's, and the only one that needs no views.
     Volume,

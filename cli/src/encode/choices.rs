@@ -167,7 +167,7 @@ fn order(report: &Report, settings: &Settings) -> Option<Choice> {
         }
         Importance::Footprint => (
             "footprint",
-            "opacity and the pixels covered, mean of all views, whatever hides it; weighed again as neighbours go",
+            "opacity, the pixels covered and an estimate of the light that reaches it, mean of all views; weighed again as neighbours go",
         ),
         Importance::Volume => ("volume", "opacity times volume, no views"),
     };
