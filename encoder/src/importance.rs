@@ -174,8 +174,13 @@ impl Ranking {
 
     /// What these pictures would show, estimated.
     fn footprint(&self, frame: &GaussianFrame) -> Vec<Worth> {
+        footprint(frame, &self.pictures())
+    }
+
+    /// The cameras of these pictures. None has more lines than it had: one of a line and many columns would have too many pixels.
+    fn pictures(&self) -> Vec<Camera> {
         let (cameras, lines) = self.small();
-        footprint(frame, &cameras.iter().map(|camera| camera.scaled_to_height(lines)).collect::<Vec<_>>())
+        cameras.iter().map(|camera| camera.scaled_to_height(lines.min(camera.height))).collect()
     }
 
     /// These cameras, and the lines of the pictures.
@@ -307,6 +312,18 @@ mod tests {
         large.planes_mut().position.into_iter().flatten().for_each(|axis| *axis *= 2.0);
         ranking.turn_to(8, &large);
         assert_ne!(ranking.cameras, of_sequence);
+    }
+
+    #[test]
+    fn pictures_are_not_larger_than_what_cameras_have() {
+        let scene = BuiltinScene { gaussians: 100, ..BuiltinScene::default() }.frame(0);
+        let [low, high] = spiral(&scene, Up::default(), 2, 540).try_into().unwrap();
+        let low = Camera { height: 2, width: 50_000, ..low };
+        let cameras = vec![low.clone(), high];
+        let ranking = Ranking::new(&Settings { cameras, preset: Preset::Fast, ..Settings::default() });
+        let [first, second] = ranking.pictures().try_into().unwrap();
+        assert_eq!(first, low);
+        assert_eq!(second.height, 96);
     }
 
     #[test]
