@@ -5,6 +5,7 @@
 //! values [take](rate) in bits; what a decoder makes of them comes from [its own functions](latent). Order, steps, transforms
 //! and codebooks stay those of the source.
 
+mod average;
 mod descent;
 mod latent;
 mod loss;

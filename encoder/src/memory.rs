@@ -90,7 +90,8 @@ const PREDICTED_FAST: Share = Share { copies: 87, bytes: 240 };
 const PREDICTED: Share = Share { copies: 108, bytes: 430 };
 /// Each temporal layer above the second has a reference more, and whole anchors have the lists of the I frame.
 const REFERENCE: Share = Share { copies: 10, bytes: 16 };
-/// Fitting values to pictures: the slopes of two views, their means and those of their squares, and what judges liked most.
+/// Fitting values to pictures: the slopes of two views, their means and those of their squares, the mean of the values, and what
+/// judges liked most.
 const FITTED: Share = Share { copies: 200, bytes: 280 };
 /// Weighing what can be left out.
 const PRUNED: Share = Share { copies: 15, bytes: 200 };

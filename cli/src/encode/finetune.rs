@@ -59,8 +59,8 @@ pub(super) struct FinetuneArgs {
     #[arg(long, value_enum, value_name = "LOSS", default_value = "squared", requires = "finetune")]
     finetune_loss: LossName,
     /// Keep in this directory how far fitting has come, until the stream is written: whatever ends this command before, --resume
-    /// goes on from there and writes the stream that it would have written. Up to 20 iterations are lost. It takes 1 KB of a
-    /// Gaussian with spherical harmonics of degree 3 while it is fitted, and a quarter of that afterwards.
+    /// goes on from there and writes the stream that it would have written. Up to 20 iterations are lost. It takes 1.4 KB
+    /// of a Gaussian with spherical harmonics of degree 3 while it is fitted, and a sixth of that afterwards.
     #[arg(long, value_name = "DIR", requires = "finetune", conflicts_with_all = ["each", "write_plan"])]
     finetune_state: Option<PathBuf>,
     /// Go on with what an earlier run has left in --finetune-state, of the same inputs with the same options; begin where none

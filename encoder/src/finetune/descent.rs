@@ -2,21 +2,21 @@
 //!
 //! Each iteration decodes the values as they would be coded now, draws the result in a few views, and takes the slopes of
 //! what is missing there for those of the values before they were rounded: so each goes on until it is rounded to the
-//! other side, and no further. Values are counted in their own steps, which makes one rate right for all attributes.
+//! other side, and no further. Values are counted in their own steps, which makes one rate right for all attributes. What
+//! judges see, and what is kept, are not the values of one moment but the [mean](super::average) of what they were rounded to.
 //!
 //! What is summed over the operating points that count, each as its receivers see it and by its weight, are logarithms of
 //! losses, in decibels where these are squared errors. Of losses themselves those of prefixes, a hundred times as large, would be
 //! all that matters.
 //!
-//! A bit is worth what it would bring elsewhere: steps that are halved cost a bit for nearly each value and divide the squared
-//! error of the whole frame by four, so that at the margin a bit brings 2 ln 2 of its logarithm by the bits of an octave. Of a loss
-//! of L1 and SSIM it is between ln 2 and 2 ln 2, by the share that each has of it.
+//! A bit is worth what it would bring elsewhere: how much better judges like the values that are nearest to those of the source
+//! than the same with steps twice as long, by the bits between them.
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of views")]
 
 mod kept;
 
+use super::average::Average;
 use super::latent::{Decoded, Latent};
-use super::loss::{FinetuneLoss, HALVINGS_OF_SQUARES, Missed};
 use super::pictures::{Pictures, Verdict, View};
 use super::rate::Rate;
 use super::receivers::Receiver;
@@ -27,7 +27,8 @@ use super::watch::FinetuneProgress;
 use crate::attribute::Attribute;
 use crate::error::Error;
 use crate::frame::compensation::{Compensator, compensated};
-use core::f64::consts::{LN_2, PI};
+use core::f64::consts::LN_10;
+use core::mem;
 use core::ops::Range;
 use core::time::Duration;
 pub(super) use kept::Finished;
@@ -42,10 +43,7 @@ use std::time::Instant;
 const VIEWS: usize = 2;
 
 /// How far an iteration takes a value at first, steps.
-const RATE: f32 = 0.02;
-
-/// The price of a bit, of what it would bring where steps are made finer.
-const PRICE: f64 = 1.0;
+const RATE: f32 = 0.015;
 
 /// Iterations from one choice of models, and one look of the judges, to the next.
 const EVERY: u32 = 20;
@@ -59,8 +57,8 @@ const PATIENCE: u32 = 5;
 /// A loss of a picture below which it shows what it should.
 const NOTHING: f64 = 1e-9;
 
-/// What halving all steps brings, dB of squared error.
-const DECIBELS_AN_OCTAVE: f64 = 6.02;
+/// Bits that the position of a new Gaussian takes less where its steps are twice as long.
+const OF_POSITION: f64 = 3.0;
 
 /// A fit under way.
 pub(super) struct Descent<'a> {
@@ -71,6 +69,10 @@ pub(super) struct Descent<'a> {
     finetune: &'a Finetune,
     adam: Adam,
     rate: f32,
+    /// Since the rate was last halved.
+    average: Average,
+    /// What a bit is worth, dB of what is made small.
+    price: f64,
     /// Iterations that are done.
     done: u32,
     start: Instant,
@@ -93,6 +95,8 @@ struct Best {
     /// Decibels, less what its bits would have brought by finer steps.
     worth: f64,
     offsets: GaussianFrame,
+    /// The values that were under way then, to go back to.
+    under_way: GaussianFrame,
     compensation: Vec<(i8, i8)>,
     /// The first look, and the one at this.
     before: Look,
@@ -117,7 +121,7 @@ impl<'a> Descent<'a> {
         compensator: Option<&'a Compensator>,
         finetune: &'a Finetune,
     ) -> Self {
-        let adam = Adam::new(&latent.offsets);
+        let (adam, average) = (Adam::new(&latent.offsets), Average::new(&latent));
         let sight = |receiver| Sight { receiver, compensation: (0, 0), loss: None };
         let sights = receivers.into_iter().map(sight).collect();
         Self {
@@ -128,6 +132,8 @@ impl<'a> Descent<'a> {
             finetune,
             adam,
             rate: RATE,
+            average,
+            price: 0.0,
             done: 0,
             start: Instant::now(),
             earlier: Duration::ZERO,
@@ -144,30 +150,28 @@ impl<'a> Descent<'a> {
     ) -> Result<(Latent<'a>, FinetuneReport), Error> {
         let mut rate = Rate::new(&self.latent)?;
         let before = self.latent.decoded()?;
-        self.compensate(&before)?;
+        self.price = self.price_of_bits(&before, rate.bits)?;
         let before = self.witnessed(&before)?;
         self.go_on(entry.as_ref())?;
         let resumed = self.done;
         while self.done < self.finetune.iterations && self.share() < 1.0 {
             self.keep(entry.as_mut(), resumed)?;
             let mut decoded = self.latent.decoded()?;
-            if self.done.is_multiple_of(EVERY) {
-                rate = Rate::new(&self.latent)?;
-                if !self.look(&decoded, &rate)? {
-                    if self.best.as_ref().is_some_and(|best| best.waited >= PATIENCE) {
-                        break;
-                    }
-                    decoded = self.back()?;
-                    rate = Rate::new(&self.latent)?;
+            self.average.add(&self.latent, &decoded.frame);
+            if self.done.is_multiple_of(EVERY) && !self.look(&mut rate)? {
+                if self.best.as_ref().is_some_and(|best| best.waited >= PATIENCE) {
+                    break;
                 }
+                decoded = self.back()?;
+                rate = Rate::new(&self.latent)?;
             }
             self.step(&decoded, &rate)?;
             self.done += 1;
             let (done, iterations) = (self.done, self.finetune.iterations);
             self.finetune.watch.tell(FinetuneProgress { spatial_layer, done, iterations });
         }
-        let last = self.latent.decoded()?;
-        self.look(&last, &Rate::new(&self.latent)?)?;
+        self.average.add(&self.latent, &self.latent.decoded()?.frame);
+        self.look(&mut rate)?;
         let receivers = self.sights.iter().map(|sight| &sight.receiver);
         let mut report = FinetuneReport {
             iterations: self.done,
@@ -175,11 +179,13 @@ impl<'a> Descent<'a> {
             seconds: self.elapsed().as_secs_f64(),
             ..FinetuneReport::of_points(spatial_layer, receivers)
         };
-        let kept = self.back()?;
-        if let Some(Best { before, after, .. }) = &self.best {
+        if let Some(Best { before, after, offsets, .. }) = &self.best {
+            self.latent.offsets = offsets.clone();
             report.psnr = [before.psnr, after.psnr];
             report.bits = [before.bits, after.bits];
         }
+        let kept = self.latent.decoded()?;
+        self.compensate_as_best();
         let seen = before.into_iter().zip(self.witnessed(&kept)?);
         report.points.iter_mut().zip(seen).for_each(|(point, (before, after))| point.psnr = [before, after]);
         if let Some(entry) = &mut entry {
@@ -228,38 +234,37 @@ impl<'a> Descent<'a> {
         (f64::from(self.done) / f64::from(self.finetune.iterations.max(1))).max(of_time)
     }
 
-    /// Goes back to the best values, with shorter steps from there.
+    /// Goes back to where the best values came from, with shorter steps from there.
     fn back(&mut self) -> Result<Decoded, Error> {
         if let Some(best) = &self.best {
-            self.latent.offsets = best.offsets.clone();
-            let sights = self.sights.iter_mut().zip(&best.compensation);
-            sights.for_each(|(sight, &compensation)| sight.compensation = compensation);
+            self.latent.offsets.clone_from(&best.under_way);
         }
+        self.compensate_as_best();
         self.adam = Adam::new(&self.latent.offsets);
         self.rate *= 0.5;
-        self.latent.decoded()
+        let decoded = self.latent.decoded()?;
+        self.average = Average::new(&self.latent);
+        self.average.add(&self.latent, &decoded.frame);
+        Ok(decoded)
     }
 
-    /// Lets the judges look; whether there was nothing better before. What is worse than the start is never kept, whatever
-    /// bits it saves.
-    fn look(&mut self, decoded: &Decoded, rate: &Rate) -> Result<bool, Error> {
-        self.compensate(decoded)?;
-        let (mut psnr, mut quality, mut halvings) = (0.0, 0.0, 0.0);
-        for sight in &self.sights {
-            let verdict = self.pictures.judge(&sight.receiver, self.shown(decoded, sight)?.as_ref())?;
-            let Verdict { psnr: own_psnr, quality: own_quality, halvings: own_halvings } = verdict;
-            let weight = sight.receiver.weight;
-            psnr += weight * own_psnr;
-            quality += weight * own_quality;
-            halvings += weight * own_halvings;
-        }
-        let an_octave = match self.finetune.loss {
-            FinetuneLoss::SquaredError => DECIBELS_AN_OCTAVE,
-            FinetuneLoss::L1Ssim { .. } => DECIBELS_AN_OCTAVE * halvings / HALVINGS_OF_SQUARES,
-        };
-        let now = Look { psnr, quality, bits: rate.bits };
+    /// Fills the holes of prefixes as those of the best values are.
+    fn compensate_as_best(&mut self) {
+        let best = self.best.iter().flat_map(|best| &best.compensation);
+        self.sights.iter_mut().zip(best).for_each(|(sight, &own)| sight.compensation = own);
+    }
+
+    /// Lets the judges look at the mean of what values were rounded to; whether there was nothing better before. What is
+    /// worse than the start is never kept, whatever bits it saves. `rate` becomes that of the mean.
+    fn look(&mut self, rate: &mut Rate) -> Result<bool, Error> {
+        let candidate = self.average.candidate(&self.latent);
+        let under_way = mem::replace(&mut self.latent.offsets, candidate);
+        *rate = Rate::new(&self.latent)?;
+        let decoded = self.latent.decoded()?;
+        let now = self.judged(&decoded, rate.bits)?;
+        let offsets = mem::replace(&mut self.latent.offsets, under_way);
         let before = self.best.as_ref().map_or(now, |best| best.before);
-        let worth = now.quality - an_octave * (now.bits - before.bits) / rate.bits_an_octave.max(1.0);
+        let worth = now.quality - self.price * (now.bits - before.bits);
         let is_better = |best: &Best| worth > best.worth && now.quality >= before.quality;
         match &mut self.best {
             Some(best) if !is_better(best) => {
@@ -267,45 +272,67 @@ impl<'a> Descent<'a> {
                 Ok(false)
             }
             best => {
-                let offsets = self.latent.offsets.clone();
+                let under_way = self.latent.offsets.clone();
                 let compensation = self.sights.iter().map(|sight| sight.compensation).collect();
-                *best = Some(Best { worth, offsets, compensation, before, after: now, waited: 0 });
+                *best = Some(Best { worth, offsets, under_way, compensation, before, after: now, waited: 0 });
                 Ok(true)
             }
         }
     }
 
+    /// What judges see of a decoded frame of so many bits.
+    fn judged(&mut self, decoded: &Decoded, bits: f64) -> Result<Look, Error> {
+        self.compensate(decoded)?;
+        let mut look = Look { psnr: 0.0, quality: 0.0, bits };
+        for sight in &self.sights {
+            let Verdict { psnr, quality } =
+                self.pictures.judge(&sight.receiver, self.shown(decoded, sight)?.as_ref())?;
+            look.psnr += sight.receiver.weight * psnr;
+            look.quality += sight.receiver.weight * quality;
+        }
+        Ok(look)
+    }
+
+    /// What a bit brings where all steps are made finer, dB: from steps twice as long to those of the values before they are
+    /// changed, `decoded`, of so many bits. 0 where bits bring nothing that judges see: then none is worth saving.
+    fn price_of_bits(&mut self, decoded: &Decoded, bits: f64) -> Result<f64, Error> {
+        let coarser = self.latent.an_octave_coarser()?;
+        let new = coarser.lists.iter().filter(|list| list.parents.is_none());
+        let positions = OF_POSITION * new.map(|list| list.rows.len()).sum::<usize>() as f64;
+        let coarser = self.judged(&coarser.decoded()?, Rate::new(&coarser)?.bits)?;
+        let own = self.judged(decoded, bits)?;
+        let (brought, taken) = (own.quality - coarser.quality, own.bits - coarser.bits + positions);
+        Ok(if taken >= 1.0 { (brought / taken).max(0.0) } else { 0.0 })
+    }
+
     /// One iteration.
     fn step(&mut self, decoded: &Decoded, rate: &Rate) -> Result<(), Error> {
         let mut gradients = Gradients::zero(&decoded.frame);
-        let mut halvings = 0.0;
-        for (place, view) in (0..VIEWS).map_while(|_| self.pictures.next()).collect::<Vec<_>>() {
-            halvings += self.look_from(decoded, place, &view, &mut gradients)?;
+        let views: Vec<_> = (0..VIEWS).map_while(|_| self.pictures.next()).collect();
+        for (place, view) in &views {
+            self.look_from(decoded, *place, view, &mut gradients)?;
         }
         self.latent.to_steps(&decoded.frame, &mut gradients);
-        // Slopes are sums over the views.
-        let price = PRICE * halvings * LN_2 / rate.bits_an_octave.max(1.0);
+        // Slopes are sums over the views, of natural logarithms.
+        let price = self.price * views.len() as f64 * LN_10 / 10.0;
         rate.add(&self.latent, decoded, price as f32, gradients.planes_mut());
-        let slower = (0.5 + 0.5 * libm::cos(PI * self.share())) as f32;
-        self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(self.rate * slower))?;
+        self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(self.rate))?;
         Ok(())
     }
 
-    /// Adds the slopes of the logarithm of what a receiver misses in a view, by each value of this layer that it sees; gives how
-    /// often that is halved where all differences are.
+    /// Adds the slopes of the logarithm of what a receiver misses in a view, by each value of this layer that it sees.
     fn look_from(
         &mut self,
         decoded: &Decoded,
         place: usize,
         view: &View,
         sum: &mut Gradients,
-    ) -> Result<f64, Error> {
-        let Some(sight) = self.sights.get(place) else { return Ok(0.0) };
+    ) -> Result<(), Error> {
+        let Some(sight) = self.sights.get(place) else { return Ok(()) };
         let shown = self.shown(decoded, sight)?;
         let prepared = PreparedFrame::new(&shown);
         let drawing = prepared.draw(&view.camera, self.pictures.background);
-        let (Missed { loss, halvings }, slopes) =
-            self.finetune.loss.of(&view.wanted, &drawing.rendering().colour)?;
+        let (loss, slopes) = self.finetune.loss.of(&view.wanted, &drawing.rendering().colour)?;
         let before = sight.loss.unwrap_or(loss);
         let mean = before + (loss - before) / REMEMBERED;
         let mut own = Gradients::zero(&shown);
@@ -316,7 +343,7 @@ impl<'a> Descent<'a> {
         if let Some(sight) = self.sights.get_mut(place) {
             sight.loss = Some(mean);
         }
-        Ok(halvings)
+        Ok(())
     }
 }
 

@@ -99,6 +99,17 @@ impl<'a> Latent<'a> {
         &self.steps
     }
 
+    /// The same values with steps twice as long.
+    ///
+    /// # Errors
+    /// What the decoder's own checks refuse.
+    pub(super) fn an_octave_coarser(&self) -> Result<Self, Error> {
+        let position_bits = self.coder.sequence.position_bits;
+        let coarser =
+            |list: &List| List { grain: list.grain.an_octave_coarser(position_bits), ..list.clone() };
+        Self::new(self.coder, self.source, self.lists.iter().map(coarser).collect())
+    }
+
     /// The values, as an encoder takes those of a source.
     ///
     /// # Errors
@@ -255,6 +266,45 @@ impl<'a> Latent<'a> {
         [Some(self.coder.colour.dc), self.coder.colour.sh]
     }
 
+    /// What a decoder makes of the values, as steps away from the source where those of the values stand; 0 for the w of
+    /// rotations.
+    pub(super) fn rounded(&self, decoded: &GaussianFrame) -> Planes {
+        let mut away = decoded.clone().into_planes();
+        let source = self.source.planes();
+        let planes: Vec<_> = away.iter_mut().zip(source.iter()).collect();
+        planes.into_par_iter().for_each(|(away, source)| {
+            away.iter_mut().zip(source).for_each(|(away, source)| *away -= source);
+        });
+        self.to_components(&mut away);
+        let planes: Vec<_> = away.iter_mut().zip(self.steps.iter()).collect();
+        planes.into_par_iter().for_each(|(away, steps)| {
+            let in_steps = |away: f32, step: f32| if step > 0.0 { away / step } else { 0.0 };
+            away.iter_mut().zip(steps).for_each(|(away, &step)| *away = in_steps(*away, step));
+        });
+        away
+    }
+
+    /// Takes colours to the components of their transforms.
+    fn to_components(&self, planes: &mut Planes) {
+        for (transform, colours) in
+            self.transforms().into_iter().zip([planes.dc.as_mut_slice(), &mut planes.sh])
+        {
+            let Some(transform) = transform else { continue };
+            let of_component = |weights: &[i16]| -> Vec<f32> {
+                let mut sums = vec![0.0; colours.first().map_or(0, Vec::len)];
+                for (plane, &weight) in colours.iter().zip(weights) {
+                    let weight = f32::from(weight) / UNIT;
+                    sums.iter_mut().zip(plane).for_each(|(sum, value)| *sum += weight * value);
+                }
+                sums
+            };
+            let rows: Vec<&[i16]> = transform.rows().collect();
+            let components: Vec<Vec<f32>> = rows.into_par_iter().map(of_component).collect();
+            colours.iter_mut().for_each(|plane| plane.fill(0.0));
+            colours.iter_mut().zip(components).for_each(|(plane, component)| *plane = component);
+        }
+    }
+
     /// Makes of what a loss gains with each value of the decoded frame what it gains with a step of each latent value: as if
     /// nothing were rounded.
     pub(super) fn to_steps(&self, decoded: &GaussianFrame, gradients: &mut Gradients) {
@@ -268,23 +318,7 @@ impl<'a> Latent<'a> {
             }
         }
         by_w.fill(0.0);
-        for (transform, colours) in
-            self.transforms().into_iter().zip([planes.dc.as_mut_slice(), &mut planes.sh])
-        {
-            let Some(transform) = transform else { continue };
-            let of_component = |weights: &[i16]| -> Vec<f32> {
-                let mut sums = vec![0.0; w.len()];
-                for (plane, &weight) in colours.iter().zip(weights) {
-                    let weight = f32::from(weight) / UNIT;
-                    sums.iter_mut().zip(plane).for_each(|(sum, slope)| *sum += weight * slope);
-                }
-                sums
-            };
-            let rows: Vec<&[i16]> = transform.rows().collect();
-            let components: Vec<Vec<f32>> = rows.into_par_iter().map(of_component).collect();
-            colours.iter_mut().for_each(|plane| plane.fill(0.0));
-            colours.iter_mut().zip(components).for_each(|(plane, component)| *plane = component);
-        }
+        self.to_components(planes);
         let scaled: Vec<(&mut Vec<f32>, &Vec<f32>)> = planes.iter_mut().zip(self.steps.iter()).collect();
         scaled.into_par_iter().for_each(|(slopes, steps)| {
             slopes.iter_mut().zip(steps).for_each(|(slope, step)| *slope *= step);

@@ -1,7 +1,7 @@
 //! The pictures that values are fitted to, and how far those of the decoded frame are from them.
 #![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; counts of pictures")]
 
-use super::loss::{FinetuneLoss, HALVINGS_OF_SQUARES, Missed};
+use super::loss::FinetuneLoss;
 use super::receivers::{LINES, Receiver};
 use super::request::{Finetune, Photograph};
 use crate::error::Error;
@@ -63,8 +63,6 @@ pub(super) struct Verdict {
     pub(super) psnr: f64,
     /// What is made small, as decibels below 1: the PSNR where that is the squared error.
     pub(super) quality: f64,
-    /// How often what is made small is halved where all differences are.
-    pub(super) halvings: f64,
 }
 
 /// A loss of a picture, a mean over its pixels, below which it shows what it should.
@@ -159,7 +157,7 @@ impl<'a> Pictures<'a> {
     pub(super) fn judge(&self, receiver: &Receiver, frame: &GaussianFrame) -> Result<Verdict, Error> {
         let FinetuneLoss::L1Ssim { .. } = self.loss else {
             let psnr = mean_psnr(&self.judges, &receiver.lines, frame, self.background);
-            return Ok(Verdict { psnr, quality: psnr, halvings: HALVINGS_OF_SQUARES });
+            return Ok(Verdict { psnr, quality: psnr });
         };
         let views = views_of(&self.judges, &receiver.lines);
         let prepared = PreparedFrame::new(frame);
@@ -167,14 +165,13 @@ impl<'a> Pictures<'a> {
         for View { camera, wanted } in views {
             let drawing = prepared.draw(camera, self.background);
             let picture = &drawing.rendering().colour;
-            let (Missed { loss, halvings }, _) = self.loss.of(wanted, picture)?;
+            let (loss, _) = self.loss.of(wanted, picture)?;
             verdict.psnr += psnr(wanted, picture).min(LOSSLESS_DB);
             verdict.quality -= 10.0 * libm::log10(loss.max(LEAST));
-            verdict.halvings += halvings;
         }
         let count = views.len().max(1) as f64;
-        let Verdict { psnr, quality, halvings } = verdict;
-        Ok(Verdict { psnr: psnr / count, quality: quality / count, halvings: halvings / count })
+        let Verdict { psnr, quality } = verdict;
+        Ok(Verdict { psnr: psnr / count, quality: quality / count })
     }
 
     /// The same in views of the lines of its layer by which nothing is chosen.

@@ -28,9 +28,6 @@ const REACH: i32 = 512;
 /// Bits of a step, at most: a value that no table has yet may be reached all the same.
 const STEEPEST: f32 = 3.0;
 
-/// A plane whose values take this many bits or more takes one more where its steps are halved; one with fewer, so much less.
-const ONE_MORE: f64 = 2.0;
-
 /// Planes of values of log-scales, opacity, rotation and dc, and the first of sh.
 const LOG_SCALES: usize = 3;
 const ROTATION: usize = 4;
@@ -42,8 +39,6 @@ pub(super) struct Rate {
     lists: Vec<ListRate>,
     /// Bits of all values but positions, as they were when the models were chosen.
     pub(super) bits: f64,
-    /// Bits that halving all steps would add, positions and all, nearly.
-    pub(super) bits_an_octave: f64,
 }
 
 /// Of one list: plane by plane.
@@ -76,14 +71,10 @@ impl Rate {
         let rows = |list: &List| list.rows.clone().map(|row| row as u32).collect();
         let added = latent.lists.iter().map(|list| (rows(list), list.grain)).collect();
         let new = NewList::all(coder, &wanted, added, &ModelsInForce::default());
-        let mut rate =
-            Self { lists: Vec::new(), bits: 0.0, bits_an_octave: 3.0 * latent.source.len() as f64 };
+        let mut rate = Self { lists: Vec::new(), bits: 0.0 };
         for (list, new) in latent.lists.iter().zip(&new) {
-            let count = list.rows.len() as f64;
             let costs = new.coded.costs(&new.values, &coder.plan);
             rate.bits += costs.iter().map(|plane| plane.bits).sum::<f64>();
-            let of_octave = |plane: &PlaneCosts| (plane.bits / ONE_MORE).min(count);
-            rate.bits_an_octave += costs.iter().map(of_octave).sum::<f64>();
             let planes = costs.into_par_iter().map(|costs| PlaneRate::new(costs, &list.rows, &new.added));
             rate.lists.push(ListRate {
                 rows: list.rows.clone(),
@@ -97,7 +88,7 @@ impl Rate {
     /// The same of values that refine those of parents.
     fn of_refinements(latent: &Latent<'_>) -> Result<Self, Error> {
         let (coder, decoded) = (latent.coder, latent.decoded()?);
-        let mut rate = Self { lists: Vec::new(), bits: 0.0, bits_an_octave: 0.0 };
+        let mut rate = Self { lists: Vec::new(), bits: 0.0 };
         for list in &latent.lists {
             let steps = coder.steps(list.grain.attribute_step);
             let added: Vec<u32> = list.rows.clone().map(|row| row as u32).collect();
@@ -108,8 +99,6 @@ impl Rate {
                     let draft = coder.section_draft(section, &values, steps, &ModelsInForce::default());
                     let costs = draft.costs(&values, &coder.plan);
                     rate.bits += costs.iter().map(|plane| plane.bits).sum::<f64>();
-                    // Halving the steps of both layers adds to the lower one; here values stay as they are.
-                    rate.bits_an_octave += costs.len() as f64 * list.rows.len() as f64;
                     costs.into_iter().map(|costs| PlaneRate::new(costs, &list.rows, &added)).collect()
                 });
             rate.lists.push(ListRate { rows: list.rows.clone(), planes, moves });

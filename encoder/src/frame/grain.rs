@@ -2,7 +2,7 @@
 
 use crate::laws::Laws;
 use crate::steps::Steps;
-use splatstream_format::syntax::{MAX_REFINEMENTS, SequenceParameters};
+use splatstream_format::syntax::{MAX_ATTRIBUTE_STEP, MAX_REFINEMENTS, SequenceParameters};
 
 /// How finely a unit codes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -20,6 +20,14 @@ impl Grain {
         let [_, _, rotation, ..] = &mut self.attribute_step;
         *rotation = rotation.saturating_sub(1);
         Self { position_shift: self.position_shift.saturating_sub(1), ..self }
+    }
+
+    /// With steps twice as long, as far as a stream has them.
+    pub(crate) fn an_octave_coarser(self, position_bits: u8) -> Self {
+        Self {
+            position_shift: self.position_shift.saturating_add(1).min(position_bits.saturating_sub(1)),
+            attribute_step: self.attribute_step.map(|step| step.saturating_add(2).min(MAX_ATTRIBUTE_STEP)),
+        }
     }
 }
 

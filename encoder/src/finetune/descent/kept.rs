@@ -49,6 +49,8 @@ impl Keep for Descent<'_> {
         with.float(&mut rate)?;
         self.rate = rate as f32;
         frame(&mut self.latent.offsets, with)?;
+        with.count(&mut self.average.taken)?;
+        frame(&mut self.average.offsets, with)?;
         self.adam.memory_mut().try_for_each(|values| floats(values, with))?;
         for sight in &mut self.sights {
             // A loss is never below 0.
@@ -60,6 +62,7 @@ impl Keep for Descent<'_> {
         let first = || Best {
             worth: 0.0,
             offsets: self.latent.offsets.clone(),
+            under_way: self.latent.offsets.clone(),
             compensation: vec![(0, 0); self.sights.len()],
             before: Look { psnr: 0.0, quality: 0.0, bits: 0.0 },
             after: Look { psnr: 0.0, quality: 0.0, bits: 0.0 },
@@ -85,6 +88,7 @@ impl Keep for Best {
         }
         with.count(&mut self.waited)?;
         frame(&mut self.offsets, with)?;
+        frame(&mut self.under_way, with)?;
         self.compensation.iter_mut().try_for_each(|own| compensation(own, with))?;
         if self.waited < PATIENCE { Ok(()) } else { Err(io::ErrorKind::InvalidData.into()) }
     }
