@@ -17,11 +17,15 @@ use splatstream_gaussians::GaussianFrame;
 /// the same with another sign. Then the value itself counts.
 const ROUNDED: f32 = 1.5;
 
-/// The mean of the places that values were rounded to since it was begun.
+/// Frames that the mean is of, nearly: older ones count less and less. More of them hide what values have come to where they
+/// go far, fewer leave more to chance.
+const FRAMES: u32 = 33;
+
+/// The running mean of the places that values were rounded to since it was begun.
 pub(super) struct Average {
     /// Steps away from the source, as those of latent values.
     pub(super) offsets: GaussianFrame,
-    /// Frames that it is of.
+    /// Frames that it is of, up to [`FRAMES`].
     pub(super) taken: u32,
 }
 
@@ -33,7 +37,7 @@ impl Average {
 
     /// Takes one more: the values as they are, `decoded`.
     pub(super) fn add(&mut self, latent: &Latent<'_>, decoded: &GaussianFrame) {
-        self.taken += 1;
+        self.taken = (self.taken + 1).min(FRAMES);
         let part = 1.0 / self.taken as f32;
         let rounded = latent.rounded(decoded);
         let mut means = self.offsets.planes_mut();

@@ -27,7 +27,7 @@ use super::watch::FinetuneProgress;
 use crate::attribute::Attribute;
 use crate::error::Error;
 use crate::frame::compensation::{Compensator, compensated};
-use core::f64::consts::LN_10;
+use core::f64::consts::{LN_10, PI};
 use core::mem;
 use core::ops::Range;
 use core::time::Duration;
@@ -316,7 +316,8 @@ impl<'a> Descent<'a> {
         // Slopes are sums over the views, of natural logarithms.
         let price = self.price * views.len() as f64 * LN_10 / 10.0;
         rate.add(&self.latent, decoded, price as f32, gradients.planes_mut());
-        self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(self.rate))?;
+        let slower = (0.5 + 0.5 * libm::cos(PI * self.share())) as f32;
+        self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(self.rate * slower))?;
         Ok(())
     }
 
