@@ -10,8 +10,8 @@ use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_encoder::{
-    Attribute, Error, Finetune, FinetuneLoss, FinetuneProgress, FinetuneReport, FinetuneWatch, Photograph,
-    PointReport, PointWeight, Preset, Report, Settings, Structure, encode,
+    Attribute, Error, Finetune, FinetuneLoss, FinetuneProgress, FinetuneWatch, Photograph, PointReport,
+    PointWeight, Preset, Report, Settings, Structure, encode,
 };
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_format::payload::SceneDescription;
@@ -273,7 +273,7 @@ fn streams_and_frames_of_any_degree_are_fitted() {
 
 /// Some frames in which things move, and settings that predict all but the first.
 fn moving(count: u32) -> Vec<GaussianFrame> {
-    let scene = BuiltinScene { gaussians: 1_500, frames: count, sh_degree: 1, ..BuiltinScene::default() };
+    let scene = BuiltinScene { gaussians: 3_000, frames: count, sh_degree: 1, ..BuiltinScene::default() };
     (0..count).map(|number| scene.frame(number)).collect()
 }
 
@@ -297,10 +297,8 @@ fn predicted_frames_follow_the_values_that_an_i_frame_was_fitted_to() {
     let (before, plain) = encoded(moving(4), &predicted(plain()));
     let (after, tuned) = encoded(moving(4), &predicted(settings(60)));
     assert_eq!(tuned.finetuned.iter().map(|report| report.frame).collect::<Vec<_>>(), [0]);
-    // What is gained is shared out between PSNR and bits.
-    let FinetuneReport { psnr: [start, end], bits: [most, least], .. } = tuned.finetuned[0];
-    let is_followed = end > start + 0.25 && least < 0.97 * most;
-    assert!(is_followed, "there is nothing to follow: {start} {end} dB, {most} {least} bits");
+    let [start, end] = tuned.finetuned[0].psnr;
+    assert!(end > start + 0.5, "there is nothing to follow: {start} {end}");
     let kinds = |report: &Report| report.coded.iter().map(|frame| frame.frame_type).collect::<Vec<_>>();
     assert_eq!(kinds(&plain), kinds(&tuned));
     assert!(after.len() as f64 <= 1.03 * before.len() as f64, "{} {}", before.len(), after.len());

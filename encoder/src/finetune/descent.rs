@@ -78,7 +78,7 @@ pub(super) struct Descent<'a> {
     start: Instant,
     /// Time that earlier runs have taken.
     earlier: Duration,
-    best: Option<Best>,
+    best: Best,
 }
 
 /// How a receiver sees the frame.
@@ -106,7 +106,7 @@ struct Best {
 }
 
 /// What judges saw.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 struct Look {
     psnr: f64,
     /// What is made small, as decibels below 1.
@@ -123,7 +123,16 @@ impl<'a> Descent<'a> {
     ) -> Self {
         let (adam, average) = (Adam::new(&latent.offsets), Average::new(&latent));
         let sight = |receiver| Sight { receiver, compensation: (0, 0), loss: None };
-        let sights = receivers.into_iter().map(sight).collect();
+        let sights: Vec<_> = receivers.into_iter().map(sight).collect();
+        let best = Best {
+            worth: 0.0,
+            offsets: latent.offsets.clone(),
+            under_way: latent.offsets.clone(),
+            compensation: vec![(0, 0); sights.len()],
+            before: Look::default(),
+            after: Look::default(),
+            waited: 0,
+        };
         Self {
             latent,
             sights,
@@ -137,7 +146,7 @@ impl<'a> Descent<'a> {
             done: 0,
             start: Instant::now(),
             earlier: Duration::ZERO,
-            best: None,
+            best,
         }
     }
 
@@ -150,7 +159,7 @@ impl<'a> Descent<'a> {
     ) -> Result<(Latent<'a>, FinetuneReport), Error> {
         let mut rate = Rate::new(&self.latent)?;
         let before = self.latent.decoded()?;
-        self.price = self.price_of_bits(&before, rate.bits)?;
+        self.begin(&before, rate.bits)?;
         let before = self.witnessed(&before)?;
         self.go_on(entry.as_ref())?;
         let resumed = self.done;
@@ -158,8 +167,9 @@ impl<'a> Descent<'a> {
             self.keep(entry.as_mut(), resumed)?;
             let mut decoded = self.latent.decoded()?;
             self.average.add(&self.latent, &decoded.frame);
-            if self.done.is_multiple_of(EVERY) && !self.look(&mut rate)? {
-                if self.best.as_ref().is_some_and(|best| best.waited >= PATIENCE) {
+            let is_due = self.done > 0 && self.done.is_multiple_of(EVERY);
+            if is_due && !self.look(&mut rate)? {
+                if self.best.waited >= PATIENCE {
                     break;
                 }
                 decoded = self.back()?;
@@ -177,13 +187,11 @@ impl<'a> Descent<'a> {
             iterations: self.done,
             resumed,
             seconds: self.elapsed().as_secs_f64(),
+            psnr: [self.best.before.psnr, self.best.after.psnr],
+            bits: [self.best.before.bits, self.best.after.bits],
             ..FinetuneReport::of_points(spatial_layer, receivers)
         };
-        if let Some(Best { before, after, offsets, .. }) = &self.best {
-            self.latent.offsets = offsets.clone();
-            report.psnr = [before.psnr, after.psnr];
-            report.bits = [before.bits, after.bits];
-        }
+        self.latent.offsets.clone_from(&self.best.offsets);
         let kept = self.latent.decoded()?;
         self.compensate_as_best();
         let seen = before.into_iter().zip(self.witnessed(&kept)?);
@@ -236,9 +244,7 @@ impl<'a> Descent<'a> {
 
     /// Goes back to where the best values came from, with shorter steps from there.
     fn back(&mut self) -> Result<Decoded, Error> {
-        if let Some(best) = &self.best {
-            self.latent.offsets.clone_from(&best.under_way);
-        }
+        self.latent.offsets.clone_from(&self.best.under_way);
         self.compensate_as_best();
         self.adam = Adam::new(&self.latent.offsets);
         self.rate *= 0.5;
@@ -250,8 +256,10 @@ impl<'a> Descent<'a> {
 
     /// Fills the holes of prefixes as those of the best values are.
     fn compensate_as_best(&mut self) {
-        let best = self.best.iter().flat_map(|best| &best.compensation);
-        self.sights.iter_mut().zip(best).for_each(|(sight, &own)| sight.compensation = own);
+        self.sights
+            .iter_mut()
+            .zip(&self.best.compensation)
+            .for_each(|(sight, &own)| sight.compensation = own);
     }
 
     /// Lets the judges look at the mean of what values were rounded to; whether there was nothing better before. What is
@@ -263,21 +271,22 @@ impl<'a> Descent<'a> {
         let decoded = self.latent.decoded()?;
         let now = self.judged(&decoded, rate.bits)?;
         let offsets = mem::replace(&mut self.latent.offsets, under_way);
-        let before = self.best.as_ref().map_or(now, |best| best.before);
+        let Best { before, worth: most, .. } = self.best;
         let worth = now.quality - self.price * (now.bits - before.bits);
-        let is_better = |best: &Best| worth > best.worth && now.quality >= before.quality;
-        match &mut self.best {
-            Some(best) if !is_better(best) => {
-                best.waited += 1;
-                Ok(false)
-            }
-            best => {
-                let under_way = self.latent.offsets.clone();
-                let compensation = self.sights.iter().map(|sight| sight.compensation).collect();
-                *best = Some(Best { worth, offsets, under_way, compensation, before, after: now, waited: 0 });
-                Ok(true)
-            }
+        let is_better = worth > most && now.quality >= before.quality;
+        if is_better {
+            let under_way = self.latent.offsets.clone();
+            let compensation = self.compensation();
+            self.best = Best { worth, offsets, under_way, compensation, before, after: now, waited: 0 };
+        } else {
+            self.best.waited += 1;
         }
+        Ok(is_better)
+    }
+
+    /// What prefixes are compensated by now.
+    fn compensation(&self) -> Vec<(i8, i8)> {
+        self.sights.iter().map(|sight| sight.compensation).collect()
     }
 
     /// What judges see of a decoded frame of so many bits.
@@ -293,16 +302,21 @@ impl<'a> Descent<'a> {
         Ok(look)
     }
 
-    /// What a bit brings where all steps are made finer, dB: from steps twice as long to those of the values before they are
-    /// changed, `decoded`, of so many bits. 0 where bits bring nothing that judges see: then none is worth saving.
-    fn price_of_bits(&mut self, decoded: &Decoded, bits: f64) -> Result<f64, Error> {
+    /// Lets the judges look at the values before they are changed, `decoded`, of so many bits, and measures what a bit is worth:
+    /// what it brings where all steps are made finer, from steps twice as long to these. 0 where bits bring nothing that judges
+    /// see: then none is worth saving.
+    fn begin(&mut self, decoded: &Decoded, bits: f64) -> Result<(), Error> {
         let coarser = self.latent.an_octave_coarser()?;
         let new = coarser.lists.iter().filter(|list| list.parents.is_none());
         let positions = OF_POSITION * new.map(|list| list.rows.len()).sum::<usize>() as f64;
         let coarser = self.judged(&coarser.decoded()?, Rate::new(&coarser)?.bits)?;
         let own = self.judged(decoded, bits)?;
         let (brought, taken) = (own.quality - coarser.quality, own.bits - coarser.bits + positions);
-        Ok(if taken >= 1.0 { (brought / taken).max(0.0) } else { 0.0 })
+        self.price = if taken >= 1.0 { (brought / taken).max(0.0) } else { 0.0 };
+        let compensation = self.compensation();
+        let best = &mut self.best;
+        (best.worth, best.compensation, best.before, best.after) = (own.quality, compensation, own, own);
+        Ok(())
     }
 
     /// One iteration.

@@ -99,7 +99,7 @@ impl<'a> Latent<'a> {
         &self.steps
     }
 
-    /// The same values with steps twice as long.
+    /// The values of the source with steps twice as long.
     ///
     /// # Errors
     /// What the decoder's own checks refuse.

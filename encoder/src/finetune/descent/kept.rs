@@ -4,7 +4,7 @@
 //! number that is named here, or follows from how many there have been, as views do.
 
 use super::super::state::entry::{Entry, Exchange, Keep, Stage};
-use super::{Best, Descent, EVERY, Latent, Look, PATIENCE, VIEWS};
+use super::{Best, Descent, EVERY, Latent, PATIENCE, VIEWS};
 use crate::error::Error;
 use crate::finetune::report::FinetuneReport;
 use splatstream_gaussians::GaussianFrame;
@@ -59,16 +59,7 @@ impl Keep for Descent<'_> {
             sight.loss = (loss >= 0.0).then_some(loss);
             compensation(&mut sight.compensation, with)?;
         }
-        let first = || Best {
-            worth: 0.0,
-            offsets: self.latent.offsets.clone(),
-            under_way: self.latent.offsets.clone(),
-            compensation: vec![(0, 0); self.sights.len()],
-            before: Look { psnr: 0.0, quality: 0.0, bits: 0.0 },
-            after: Look { psnr: 0.0, quality: 0.0, bits: 0.0 },
-            waited: 0,
-        };
-        self.best.get_or_insert_with(first).exchange(with)?;
+        self.best.exchange(with)?;
         let can_be = self.done.is_multiple_of(EVERY) && self.done <= self.finetune.iterations;
         let (true, Ok(earlier)) = (can_be && rate.is_finite(), Duration::try_from_secs_f64(seconds)) else {
             return Err(io::ErrorKind::InvalidData.into());
