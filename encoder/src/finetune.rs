@@ -5,10 +5,10 @@
 //! values [take](rate) in bits; what a decoder makes of them comes from [its own functions](latent). Order, steps, transforms
 //! and codebooks stay those of the source.
 
-mod average;
 mod descent;
 mod latent;
 mod loss;
+mod means;
 mod pictures;
 mod rate;
 mod receivers;

@@ -126,13 +126,13 @@ fn ring_dissimilarity(bytes: &[u8], source: &GaussianFrame) -> f64 {
 
 #[test]
 fn l1_and_ssim_bring_pictures_from_elsewhere_nearer_in_ssim() {
-    let scene = || vec![builtin(3_000, 1)];
+    let scene = || vec![builtin(6_000, 1)];
     let (before, _) = encoded(scene(), &plain());
     let (squared, _) = encoded(scene(), &settings(40));
     let (after, report) = encoded(scene(), &by_l1_ssim(40));
     assert_ne!(after, squared);
     let [without, with] = [&before, &after].map(|bytes| ring_dissimilarity(bytes, &scene()[0]));
-    assert!(with < 0.95 * without, "{without} {with}; {:?}", report.finetuned);
+    assert!(with < 0.9 * without, "{without} {with}; {:?}", report.finetuned);
     assert!(after.len() < before.len(), "{} {}", before.len(), after.len());
 }
 

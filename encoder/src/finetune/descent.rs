@@ -3,7 +3,7 @@
 //! Each iteration decodes the values as they would be coded now, draws the result in a few views, and takes the slopes of
 //! what is missing there for those of the values before they were rounded: so each goes on until it is rounded to the
 //! other side, and no further. Values are counted in their own steps, which makes one rate right for all attributes. What
-//! judges see, and what is kept, are not the values of one moment but the [mean](super::average) of what they were rounded to.
+//! judges see, and what is kept, are not the values of one moment but [means](super::means) of what they were rounded to.
 //!
 //! What is summed over the operating points that count, each as its receivers see it and by its weight, are logarithms of
 //! losses, in decibels where these are squared errors. Of losses themselves those of prefixes, a hundred times as large, would be
@@ -15,8 +15,8 @@
 
 mod kept;
 
-use super::average::Average;
 use super::latent::{Decoded, Latent};
+use super::means::Means;
 use super::pictures::{Pictures, Verdict, View};
 use super::rate::Rate;
 use super::receivers::Receiver;
@@ -51,7 +51,7 @@ const EVERY: u32 = 20;
 /// Slopes are divided by the loss of about so many of the last views of the same receiver.
 const REMEMBERED: f64 = 20.0;
 
-/// Looks of the judges, one after the other, at nothing better after which it ends: each halves the rate.
+/// Looks of the judges, one after the other, at nothing better after which it ends.
 const PATIENCE: u32 = 5;
 
 /// A loss of a picture below which it shows what it should.
@@ -68,9 +68,7 @@ pub(super) struct Descent<'a> {
     pictures: Pictures<'a>,
     finetune: &'a Finetune,
     adam: Adam,
-    rate: f32,
-    /// Since the rate was last halved.
-    average: Average,
+    means: Means,
     /// What a bit is worth, dB of what is made small.
     price: f64,
     /// Iterations that are done.
@@ -95,8 +93,6 @@ struct Best {
     /// Decibels, less what its bits would have brought by finer steps.
     worth: f64,
     offsets: GaussianFrame,
-    /// The values that were under way then, to go back to.
-    under_way: GaussianFrame,
     compensation: Vec<(i8, i8)>,
     /// The first look, and the one at this.
     before: Look,
@@ -121,13 +117,12 @@ impl<'a> Descent<'a> {
         compensator: Option<&'a Compensator>,
         finetune: &'a Finetune,
     ) -> Self {
-        let (adam, average) = (Adam::new(&latent.offsets), Average::new(&latent));
+        let (adam, means) = (Adam::new(&latent.offsets), Means::new(&latent));
         let sight = |receiver| Sight { receiver, compensation: (0, 0), loss: None };
         let sights: Vec<_> = receivers.into_iter().map(sight).collect();
         let best = Best {
             worth: 0.0,
             offsets: latent.offsets.clone(),
-            under_way: latent.offsets.clone(),
             compensation: vec![(0, 0); sights.len()],
             before: Look::default(),
             after: Look::default(),
@@ -140,8 +135,7 @@ impl<'a> Descent<'a> {
             pictures,
             finetune,
             adam,
-            rate: RATE,
-            average,
+            means,
             price: 0.0,
             done: 0,
             start: Instant::now(),
@@ -165,23 +159,21 @@ impl<'a> Descent<'a> {
         let resumed = self.done;
         while self.done < self.finetune.iterations && self.share() < 1.0 {
             self.keep(entry.as_mut(), resumed)?;
-            let mut decoded = self.latent.decoded()?;
-            self.average.add(&self.latent, &decoded.frame);
-            let is_due = self.done > 0 && self.done.is_multiple_of(EVERY);
-            if is_due && !self.look(&mut rate)? {
+            let decoded = self.latent.decoded()?;
+            self.means.add(&self.latent, &decoded.frame);
+            if self.done > 0 && self.done.is_multiple_of(EVERY) {
+                rate = self.look()?;
                 if self.best.waited >= PATIENCE {
                     break;
                 }
-                decoded = self.back()?;
-                rate = Rate::new(&self.latent)?;
             }
             self.step(&decoded, &rate)?;
             self.done += 1;
             let (done, iterations) = (self.done, self.finetune.iterations);
             self.finetune.watch.tell(FinetuneProgress { spatial_layer, done, iterations });
         }
-        self.average.add(&self.latent, &self.latent.decoded()?.frame);
-        self.look(&mut rate)?;
+        self.means.add(&self.latent, &self.latent.decoded()?.frame);
+        self.look()?;
         let receivers = self.sights.iter().map(|sight| &sight.receiver);
         let mut report = FinetuneReport {
             iterations: self.done,
@@ -242,18 +234,6 @@ impl<'a> Descent<'a> {
         (f64::from(self.done) / f64::from(self.finetune.iterations.max(1))).max(of_time)
     }
 
-    /// Goes back to where the best values came from, with shorter steps from there.
-    fn back(&mut self) -> Result<Decoded, Error> {
-        self.latent.offsets.clone_from(&self.best.under_way);
-        self.compensate_as_best();
-        self.adam = Adam::new(&self.latent.offsets);
-        self.rate *= 0.5;
-        let decoded = self.latent.decoded()?;
-        self.average = Average::new(&self.latent);
-        self.average.add(&self.latent, &decoded.frame);
-        Ok(decoded)
-    }
-
     /// Fills the holes of prefixes as those of the best values are.
     fn compensate_as_best(&mut self) {
         self.sights
@@ -262,26 +242,29 @@ impl<'a> Descent<'a> {
             .for_each(|(sight, &own)| sight.compensation = own);
     }
 
-    /// Lets the judges look at the mean of what values were rounded to; whether there was nothing better before. What is
-    /// worse than the start is never kept, whatever bits it saves. `rate` becomes that of the mean.
-    fn look(&mut self, rate: &mut Rate) -> Result<bool, Error> {
-        let candidate = self.average.candidate(&self.latent);
-        let under_way = mem::replace(&mut self.latent.offsets, candidate);
-        *rate = Rate::new(&self.latent)?;
+    /// Lets the judges look at the means of what values were rounded to, and keeps what they like more than all before. Gives the
+    /// models of the mean of the last.
+    fn look(&mut self) -> Result<Rate, Error> {
+        self.best.waited += 1;
+        self.show(|means| &mut means.other)?;
+        self.show(|means| &mut means.last)
+    }
+
+    /// Lets them look at one of the means. What is worse than the start is never kept, whatever bits it saves.
+    fn show(&mut self, mean: fn(&mut Means) -> &mut GaussianFrame) -> Result<Rate, Error> {
+        mem::swap(&mut self.latent.offsets, mean(&mut self.means));
+        let rate = Rate::new(&self.latent)?;
         let decoded = self.latent.decoded()?;
         let now = self.judged(&decoded, rate.bits)?;
-        let offsets = mem::replace(&mut self.latent.offsets, under_way);
-        let Best { before, worth: most, .. } = self.best;
-        let worth = now.quality - self.price * (now.bits - before.bits);
-        let is_better = worth > most && now.quality >= before.quality;
-        if is_better {
-            let under_way = self.latent.offsets.clone();
-            let compensation = self.compensation();
-            self.best = Best { worth, offsets, under_way, compensation, before, after: now, waited: 0 };
-        } else {
-            self.best.waited += 1;
+        mem::swap(&mut self.latent.offsets, mean(&mut self.means));
+        let compensation = self.compensation();
+        let best = &mut self.best;
+        let worth = now.quality - self.price * (now.bits - best.before.bits);
+        if worth > best.worth && now.quality >= best.before.quality {
+            best.offsets.clone_from(mean(&mut self.means));
+            (best.worth, best.compensation, best.after, best.waited) = (worth, compensation, now, 0);
         }
-        Ok(is_better)
+        Ok(rate)
     }
 
     /// What prefixes are compensated by now.
@@ -331,7 +314,7 @@ impl<'a> Descent<'a> {
         let price = self.price * views.len() as f64 * LN_10 / 10.0;
         rate.add(&self.latent, decoded, price as f32, gradients.planes_mut());
         let slower = (0.5 + 0.5 * libm::cos(PI * self.share())) as f32;
-        self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(self.rate * slower))?;
+        self.adam.step(&mut self.latent.offsets, &gradients, &self.finetune.rates(RATE * slower))?;
         Ok(())
     }
 

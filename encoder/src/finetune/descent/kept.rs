@@ -45,12 +45,10 @@ impl Keep for Descent<'_> {
         let mut seconds = self.elapsed().as_secs_f64();
         with.count(&mut self.done)?;
         with.float(&mut seconds)?;
-        let mut rate = f64::from(self.rate);
-        with.float(&mut rate)?;
-        self.rate = rate as f32;
         frame(&mut self.latent.offsets, with)?;
-        with.count(&mut self.average.taken)?;
-        frame(&mut self.average.offsets, with)?;
+        with.count(&mut self.means.taken)?;
+        frame(&mut self.means.last, with)?;
+        frame(&mut self.means.other, with)?;
         self.adam.memory_mut().try_for_each(|values| floats(values, with))?;
         for sight in &mut self.sights {
             // A loss is never below 0.
@@ -61,7 +59,7 @@ impl Keep for Descent<'_> {
         }
         self.best.exchange(with)?;
         let can_be = self.done.is_multiple_of(EVERY) && self.done <= self.finetune.iterations;
-        let (true, Ok(earlier)) = (can_be && rate.is_finite(), Duration::try_from_secs_f64(seconds)) else {
+        let (true, Ok(earlier)) = (can_be, Duration::try_from_secs_f64(seconds)) else {
             return Err(io::ErrorKind::InvalidData.into());
         };
         (self.earlier, self.start) = (earlier, Instant::now());
@@ -79,7 +77,6 @@ impl Keep for Best {
         }
         with.count(&mut self.waited)?;
         frame(&mut self.offsets, with)?;
-        frame(&mut self.under_way, with)?;
         self.compensation.iter_mut().try_for_each(|own| compensation(own, with))?;
         if self.waited < PATIENCE { Ok(()) } else { Err(io::ErrorKind::InvalidData.into()) }
     }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// What the file of a fit begins with.
-const MAGIC: [u8; 8] = *b"SPLATFT2";
+const MAGIC: [u8; 8] = *b"SPLATFT3";
 
 /// Writing takes no more than one part of so many of the time.
 const PARTS: u32 = 20;
