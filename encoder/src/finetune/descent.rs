@@ -151,29 +151,13 @@ impl<'a> Descent<'a> {
         spatial_layer: u8,
         mut entry: Option<Entry>,
     ) -> Result<(Latent<'a>, FinetuneReport), Error> {
-        let mut rate = Rate::new(&self.latent)?;
+        let rate = Rate::new(&self.latent)?;
         let before = self.latent.decoded()?;
         self.begin(&before, rate.bits)?;
         let before = self.witnessed(&before)?;
         self.go_on(entry.as_ref())?;
         let resumed = self.done;
-        while self.done < self.finetune.iterations && self.share() < 1.0 {
-            self.keep(entry.as_mut(), resumed)?;
-            let decoded = self.latent.decoded()?;
-            self.means.add(&self.latent, &decoded.frame);
-            if self.done > 0 && self.done.is_multiple_of(EVERY) {
-                rate = self.look()?;
-                if self.best.waited >= PATIENCE {
-                    break;
-                }
-            }
-            self.step(&decoded, &rate)?;
-            self.done += 1;
-            let (done, iterations) = (self.done, self.finetune.iterations);
-            self.finetune.watch.tell(FinetuneProgress { spatial_layer, done, iterations });
-        }
-        self.means.add(&self.latent, &self.latent.decoded()?.frame);
-        self.look()?;
+        self.descend(rate, spatial_layer, entry.as_mut())?;
         let receivers = self.sights.iter().map(|sight| &sight.receiver);
         let mut report = FinetuneReport {
             iterations: self.done,
@@ -192,6 +176,35 @@ impl<'a> Descent<'a> {
             entry.write(Stage::Finished, &mut Finished { latent: &mut self.latent, report: &mut report })?;
         }
         Ok((self.latent, report))
+    }
+
+    /// All iterations, each from the models of the last look: the first from `rate`.
+    fn descend(
+        &mut self,
+        mut rate: Rate,
+        spatial_layer: u8,
+        mut entry: Option<&mut Entry>,
+    ) -> Result<(), Error> {
+        let resumed = self.done;
+        loop {
+            let is_over = self.done >= self.finetune.iterations || self.share() >= 1.0;
+            if !is_over {
+                self.keep(entry.as_deref_mut(), resumed)?;
+            }
+            let decoded = self.latent.decoded()?;
+            self.means.add(&self.latent, &decoded.frame, self.done + 1);
+            if is_over || (self.done > 0 && self.done.is_multiple_of(EVERY)) {
+                rate = self.look()?;
+            }
+            if is_over || self.best.waited >= PATIENCE {
+                break;
+            }
+            self.step(&decoded, &rate)?;
+            self.done += 1;
+            let (done, iterations) = (self.done, self.finetune.iterations);
+            self.finetune.watch.tell(FinetuneProgress { spatial_layer, done, iterations });
+        }
+        Ok(())
     }
 
     /// What a receiver sees.

@@ -7,7 +7,6 @@
 //!
 //! Source: Nagel et al., "Overcoming oscillations in quantization-aware training", 2022, on values that go to and fro; Polyak,
 //! Juditsky, "Acceleration of stochastic approximation by averaging", 1992.
-#![expect(clippy::arithmetic_side_effects, reason = "sums and products of floats; a count of iterations")]
 
 use super::latent::Latent;
 use rayon::prelude::*;
@@ -29,35 +28,34 @@ pub(super) struct Means {
     pub(super) last: GaussianFrame,
     /// Of all; as long as these are no more than the last ones, the latest alone.
     pub(super) other: GaussianFrame,
-    /// Frames that there were.
-    pub(super) taken: u32,
 }
 
 impl Means {
     /// Of nothing yet.
     pub(super) fn new(latent: &Latent<'_>) -> Self {
-        Self { last: latent.offsets.clone(), other: latent.offsets.clone(), taken: 0 }
+        Self { last: latent.offsets.clone(), other: latent.offsets.clone() }
     }
 
-    /// Takes one more: the values as they are, `decoded`.
-    pub(super) fn add(&mut self, latent: &Latent<'_>, decoded: &GaussianFrame) {
-        if self.taken == LAST {
+    /// Takes one more, of which there are `frames` with it: the values as they are, `decoded`.
+    pub(super) fn add(&mut self, latent: &Latent<'_>, decoded: &GaussianFrame, frames: u32) {
+        // Up to these both means are of the same frames.
+        if frames == LAST + 1 {
             self.other.clone_from(&self.last);
         }
-        self.taken += 1;
+        let of_last = 1.0 / frames.min(LAST) as f32;
+        let of_other = if frames > LAST { 1.0 / frames as f32 } else { 1.0 };
         let rounded = latent.rounded(decoded);
-        let of_other = if self.taken > LAST { self.taken } else { 1 };
-        for (mean, frames) in [(&mut self.last, self.taken.min(LAST)), (&mut self.other, of_other)] {
-            let part = 1.0 / frames as f32;
-            let mut means = mean.planes_mut();
-            let own = latent.offsets.planes();
-            let planes: Vec<_> = means.iter_mut().zip(rounded.iter().zip(own.iter())).collect();
-            planes.into_par_iter().for_each(|(means, (rounded, own))| {
-                for (mean, (&rounded, &own)) in means.iter_mut().zip(rounded.iter().zip(own)) {
-                    let place = if (rounded - own).abs() < ROUNDED { rounded } else { own };
-                    *mean += part * (place - *mean);
-                }
-            });
-        }
+        let own = latent.offsets.planes();
+        let (mut last, mut other) = (self.last.planes_mut(), self.other.planes_mut());
+        let means = last.iter_mut().zip(other.iter_mut());
+        let planes: Vec<_> = means.zip(rounded.iter().zip(own.iter())).collect();
+        planes.into_par_iter().for_each(|((last, other), (rounded, own))| {
+            let means = last.iter_mut().zip(other.iter_mut());
+            for ((last, other), (&rounded, &own)) in means.zip(rounded.iter().zip(own)) {
+                let place = if (rounded - own).abs() < ROUNDED { rounded } else { own };
+                *last += of_last * (place - *last);
+                *other += of_other * (place - *other);
+            }
+        });
     }
 }

@@ -46,7 +46,6 @@ impl Keep for Descent<'_> {
         with.count(&mut self.done)?;
         with.float(&mut seconds)?;
         frame(&mut self.latent.offsets, with)?;
-        with.count(&mut self.means.taken)?;
         frame(&mut self.means.last, with)?;
         frame(&mut self.means.other, with)?;
         self.adam.memory_mut().try_for_each(|values| floats(values, with))?;
