@@ -150,6 +150,22 @@ fn a_minute_without_network_is_one_stall_and_nothing_more() {
 }
 
 #[test]
+fn a_whole_gop_is_played_when_a_request_for_more_of_it_fails() {
+    // The rule gives the last GOP up in an outage, with its base there, and asks for a little more. That request fails when
+    // the GOP is due: nothing else arrives that playback could go on with.
+    let trace = Trace::new(&[
+        (1_067_148, 8_290_264),
+        (10_464_574, 25_290_626),
+        (15_504_235, 0),
+        (5_000_000, 2_000_000),
+    ]);
+    let link = Link { losses_us: vec![24_080_737], ..Link::new(trace.unwrap()) };
+    let report = simulate(&ladders::small(25), &Settings::default(), Single::whole(Bola::default()), &link);
+    assert!(report.complete && report.abandoned == 1);
+    assert_eq!((report.shown.len(), report.stalled_us()), (25, 0));
+}
+
+#[test]
 fn a_network_that_carries_nothing_ends_at_the_limit() {
     let ladder = ladders::small(5);
     let link = Link { limit_us: 120_000_000, ..Link::new(Trace::constant(0)) };

@@ -109,6 +109,8 @@ impl<R: Rule> Session<R> {
         let wait_us = 100_000_u64 << state.failures.min(5);
         state.failures = state.failures.saturating_add(1);
         state.retry_us = state.now_us.saturating_add(wait_us);
+        // A GOP that waited for the whole of a request is ready without what was still to come.
+        self.resume();
     }
 
     /// Says that pieces of a GOP arrived damaged: those of a Representation from a refinement on. They are fetched again where
