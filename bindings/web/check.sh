@@ -32,15 +32,6 @@ vectors() {
         cargo test --quiet -p splatstream-format -p splatstream-decoder --lib --target $target -- entropy::machine motion:: moves::
 }
 
-# The modules for engines without instructions of 128 bits.
-plain() {
-    local status=0
-    ./build.sh --plain || status=$?
-    [ $status -ne 3 ] || { echo "skipped: the modules for engines without vectors"; return; }
-    [ $status -eq 0 ] || return $status
-    node --test tests/plain.test.mjs
-}
-
 sizes() {
     at_most 'the module' 778000 decoder/splatstream.wasm
     gzip -9c decoder/splatstream.wasm | at_most 'the module, compressed' 285000
@@ -88,12 +79,11 @@ node --test tests/node.test.mjs tests/package.test.mjs
 sizes
 licences
 node tests/speed.mjs "$WEB_TESTS/scene/demo.gss"
-if ! packages typescript@5.9.3 wabt@1.0.39 three@0.187.0 @types/three@0.187.0 @sparkjsdev/spark@2.2.0 playcanvas@2.23.3; then
-    echo "skipped: types, engines without vectors and the browser, for which npm cannot install TypeScript, WABT, Spark and PlayCanvas"
+if ! packages typescript@5.9.3 three@0.187.0 @types/three@0.187.0 @sparkjsdev/spark@2.2.0 playcanvas@2.23.3; then
+    echo "skipped: types and the browser, for which npm cannot install TypeScript, Spark and PlayCanvas"
     exit
 fi
 types
-ENGINES=$tools plain
 if browser; then
     node --test --test-concurrency=1 tests/browser.test.mjs tests/packages.test.mjs tests/engines.test.mjs tests/readme.test.mjs
     node tests/first.mjs "$WEB_TESTS/long/demo.gss" "$WEB_TESTS/package"
