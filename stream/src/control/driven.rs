@@ -57,7 +57,6 @@ impl<R: Rule> Session<R> {
     pub fn give_up(&mut self, now_us: u64) {
         self.advance(now_us);
         self.end_request(true);
-        self.resume();
     }
 
     /// What has arrived of a GOP is there no more.

@@ -61,7 +61,6 @@ impl<R: Rule> Session<R> {
             }
             Decision::Abandon if state.request.is_some() => {
                 self.end_request(true);
-                self.resume();
             }
             Decision::Fetch(_) | Decision::Abandon => {
                 return Decision::Wait { until_us: state.now_us.saturating_add(1000) };
@@ -109,8 +108,6 @@ impl<R: Rule> Session<R> {
         let wait_us = 100_000_u64 << state.failures.min(5);
         state.failures = state.failures.saturating_add(1);
         state.retry_us = state.now_us.saturating_add(wait_us);
-        // A GOP that waited for the whole of a request is ready without what was still to come.
-        self.resume();
     }
 
     /// Says that pieces of a GOP arrived damaged: those of a Representation from a refinement on. They are fetched again where
@@ -134,6 +131,7 @@ impl<R: Rule> Session<R> {
         self.resume();
     }
 
+    /// The running request, if there is one, has ended. A GOP that waited for the whole of it may be ready now.
     pub(super) fn end_request(&mut self, wanted: bool) {
         let state = &mut self.state;
         let Some(request) = state.request.take() else { return };
@@ -148,6 +146,7 @@ impl<R: Rule> Session<R> {
                 *arrived = Levels::none(state.ladder.representations().len());
             }
         }
+        self.resume();
     }
 
     /// Moves the playhead to the present, without asking for a decision.
