@@ -8,6 +8,7 @@ use crate::entropy::model::{ModelTrace, Source, read_models};
 use crate::payload::{CodedSection, leb128};
 use crate::syntax::reader::Traced;
 use crate::syntax::{FrameHeader, GopHeader, ShHeader, TransformHeader, TransformKind, after};
+use std::collections::BTreeMap;
 
 /// What the models of a unit depend on: the ranks of the transforms, and the models before.
 #[derive(Default)]
@@ -21,7 +22,7 @@ pub(super) struct Coding {
     /// The models in force for its next unit.
     pub(super) in_force: ModelsOfFrame,
     /// Earlier frames of the GOP, and the models for those that refer to them.
-    earlier: Vec<(u32, ModelsInForce)>,
+    earlier: BTreeMap<u32, ModelsInForce>,
 }
 
 impl Coding {
@@ -47,10 +48,10 @@ impl Coding {
             let role = gop.role(number.checked_sub(first)?);
             first.checked_add(role.reference?)
         });
-        self.earlier.push((self.frame, core::mem::take(&mut self.in_force.first)));
+        self.earlier.insert(self.frame, core::mem::take(&mut self.in_force.first));
         self.frame = number;
-        let of = |reference| self.earlier.iter().rev().find(|(number, _)| reference == *number);
-        self.in_force.first = reference.and_then(of).map(|(_, models)| models.clone()).unwrap_or_default();
+        let of_reference = reference.and_then(|reference| self.earlier.get(&reference));
+        self.in_force.first = of_reference.cloned().unwrap_or_default();
     }
 }
 
