@@ -1,9 +1,9 @@
 //! What streams cost: the memory and time of decoding, inspecting and extracting are bounded by the bytes of the stream and
 //! the limits of whoever does it.
 
+use crate::allowance::{Allowance, within};
 use crate::decode::{choice, stream_of};
 use crate::edits;
-use crate::measured::{Allowance, within};
 use crate::seal::sealed;
 use splatstream::{Decoder, Limits};
 use splatstream_decoder::operating_point::{OperatingPoint, extract, operating_points};
@@ -24,7 +24,7 @@ pub const LIMITS: Limits = Limits {
 
 /// Most bytes of payloads that make a stream longer. Units without a payload may come [`MAX_TIMES`] times: what takes the
 /// square of their number then shows.
-const MAX_PAYLOAD: usize = 1 << 17;
+const MAX_PAYLOAD: usize = 1 << 18;
 const MAX_TIMES: u8 = 15;
 
 /// A stream as for `decode` after two bytes, which say a unit and how often it comes again: a power of two.
@@ -93,10 +93,10 @@ const FIXED: u64 = 2 << 20;
 const INSPECTED: u64 = 16;
 const EXTRACTED: u64 = 24;
 const DECODED: u64 = 24;
-/// Time of any stream.
+/// Time of any stream, here and below on a machine of [slowness](crate::yardstick::slowness) 1.
 const FIXED_TIME: Duration = Duration::from_millis(50);
 /// Time for each byte of a unit header and of a payload, in nanoseconds.
-const HEADER_TIME: u64 = 150;
-const PAYLOAD_TIME: u64 = 3_000;
+const HEADER_TIME: u64 = 600;
+const PAYLOAD_TIME: u64 = 600;
 /// Time for each value that [`Limits::max_work`] counts, in nanoseconds.
 const WORK_TIME: u64 = 30;

@@ -4,6 +4,7 @@
 //! Each takes any bytes and returns. A panic is a finding, and so are a request for more memory than
 //! [`ceiling`] allows and an input that takes seconds.
 
+pub mod allowance;
 pub mod ceiling;
 pub mod cost;
 pub mod decode;
@@ -22,6 +23,7 @@ pub mod streams;
 pub mod synthetic;
 pub mod targets;
 pub mod units;
+pub mod yardstick;
 
 use splatstream_format::Limits;
 

@@ -1,4 +1,4 @@
-//! What work takes, and how much it may take.
+//! What work takes.
 
 use crate::ceiling;
 use std::time::Duration;
@@ -10,30 +10,6 @@ pub struct Taken {
     pub peak: u64,
     /// Processor time, which does not depend on what else the machine does; zero where it is not known.
     pub time: Duration,
-}
-
-/// What work on an input may take.
-#[derive(Debug, Clone, Copy)]
-pub struct Allowance {
-    /// Bytes in use at the same time.
-    pub peak: u64,
-    /// Processor time of a program that is optimised.
-    pub time: Duration,
-}
-
-/// Programs that are not optimised take so many times as long.
-const DEBUG: u32 = if cfg!(fuzzing) { 1 } else { 20 };
-
-/// Does some work within an allowance.
-///
-/// # Panics
-/// The work took more.
-pub fn within<T>(what: &str, allowed: &Allowance, work: impl FnOnce() -> T) -> T {
-    let (result, taken) = measured(work);
-    assert!(taken.peak <= allowed.peak, "{what} holds {} bytes, {} are allowed", taken.peak, allowed.peak);
-    let time = allowed.time * DEBUG;
-    assert!(taken.time <= time, "{what} takes {:?}, {time:?} are allowed", taken.time);
-    result
 }
 
 /// Does some work, and says what it took.

@@ -1,7 +1,7 @@
 //! The readers of scene files and of files of many frames: on any bytes, and on files that are packed from what an input says, so that what lies
 //! behind compression and checksums is read.
 
-use crate::measured::{Allowance, within};
+use crate::allowance::{Allowance, within};
 use splatstream_files::{
     ReadLimits, SceneError, SceneFormat, Sequence, SequenceOptions, compressed_ply, gltf, ksplat, ply, sog,
     splat, spz,
