@@ -281,12 +281,18 @@ impl Plan {
 
 /// Whether frames that each stand for themselves might take fewer bytes than a GOP did.
 fn is_doubtful(report: &Report) -> bool {
+    share_of_intra(report) > DOUBTFUL
+}
+
+/// What a Gaussian of all frames takes, as a part of what one of an I frame does. Of a single frame nothing.
+pub(crate) fn share_of_intra(report: &Report) -> f64 {
     let of = |counts: fn(FrameType) -> bool| {
         let frames = report.coded.iter().filter(|frame| counts(frame.frame_type));
         frames.fold((0.0, 0.0), |sum, frame| (sum.0 + frame.bytes as f64, sum.1 + f64::from(frame.gaussians)))
     };
     let (all, intra) = (of(|_| true), of(|kind| kind == FrameType::Intra));
-    report.coded.len() > 1 && all.0 * intra.1 > DOUBTFUL * intra.0 * all.1
+    let share = all.0 * intra.1 / (intra.0 * all.1);
+    if report.coded.len() > 1 && share.is_finite() { share } else { 0.0 }
 }
 
 /// Whether a decoder has of a stream what [fitting](crate::allocation) made of its only frame to draw it: fitting knows no

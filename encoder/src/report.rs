@@ -203,7 +203,8 @@ pub struct TargetReport {
     pub encodings: u32,
     /// Times that a part of it was encoded.
     pub trials: u32,
-    /// Whether values are not fitted to pictures, although the settings say so: without, the stream is smaller.
+    /// Whether values are not fitted to pictures, although the settings say so: without, the stream takes fewer bytes at
+    /// equal PSNR.
     pub without_finetune: bool,
     /// Whether SH has no codebook, although the settings leave it open: it would have cost pictures too much.
     pub without_codebook: bool,

@@ -5,22 +5,21 @@
 //! or less, by the [secant](crate::secant) through what is known.
 #![expect(clippy::arithmetic_side_effects, reason = "counts of encodings and frames; layers are at most 4")]
 
-use crate::allocation::{Fit, finer};
+mod fitting;
+
 use crate::error::Error;
-use crate::first_frame::{coded_form, first_frame, read_first};
+use crate::finetune::{Finetune, FinetuneLoss};
 use crate::importance::Ranking;
 use crate::pass::{encode_once, encode_smaller};
+use crate::plan::share_of_intra;
 use crate::progress::Progress;
 use crate::report::{Report, TargetReport};
-use crate::savings::Saving;
 use crate::secant::Secant;
 use crate::sequence;
-use crate::settings::{Preset, Settings, ShChoice, Size};
+use crate::settings::{Settings, Size};
 use crate::source::FrameSource;
-use crate::steps::Steps;
-use crate::strips::StripViews;
-use crate::verification::{Tried, Views};
 use crate::window::FirstFrames;
+use fitting::{Fitting, Way};
 use splatstream_format::syntax::FrameType;
 use std::io::Write;
 
@@ -36,18 +35,16 @@ const NEAR_SIZE: f64 = 0.015;
 const FIRST: f64 = 47.0;
 const GROWTH: f64 = 0.036;
 
-/// Steps are shared differently among attributes where the PSNR is another by more than this, decibels.
-const ALIKE: f64 = 4.0;
-
-/// What fitting values to pictures brings on average scenes, decibels, after many iterations; and after how many it has
-/// brought two thirds of that.
-const GAIN: [f64; 2] = [3.6, 45.0];
-
 /// Finer steps are given up where pictures gain less than this share of what they should.
 const LEAST_GAIN: f64 = 0.05;
 
-/// Where fitting brings pictures of a single frame less than this, it is tried without as well, decibels.
+/// Where fitting brings pictures of a single frame less than this, it is tried without as well, decibels. Sequences whose
+/// frames are predicted are always tried without: what their first frames gain, the others may lose.
 const DOUBTFUL_GAIN: f64 = 0.5;
+
+/// Frames of a sequence that is fitted to pictures each stand for themselves where predicted they take more than this part of
+/// what I frames do, all together: of I frames fitting takes more, and it gains in each.
+const ALONE: f64 = 0.85;
 
 /// Encodings for a PSNR and for a size, at most.
 const MOST_FOR_PSNR: usize = 4;
@@ -75,7 +72,7 @@ pub(crate) fn reach(
     // Before anything is fitted to what no stream can carry.
     sequence::check(settings)?;
     let mut seeker = Seeker::new(source, settings, progress)?;
-    let Found { fitted, encoded } = seeker.find()?;
+    let Found { fitted, encoded, .. } = seeker.find()?;
     let mut report = match encoded {
         Some(encoded) => {
             sink.write_all(&encoded.bytes)?;
@@ -118,7 +115,7 @@ pub(crate) fn settle(
 ) -> Result<(Settings, Ranking, Report), Error> {
     let mut progress = |_, _| ();
     let mut seeker = Seeker::new(source, settings, &mut progress)?;
-    let Found { fitted, encoded } = seeker.find()?;
+    let Found { fitted, encoded, .. } = seeker.find()?;
     let mut report = match encoded {
         Some(encoded) => encoded.report,
         None => seeker.whole(fitted, &mut std::io::sink())?,
@@ -129,113 +126,6 @@ pub(crate) fn settle(
         settled = settled.alone();
     }
     Ok((settled, seeker.fitting.ranking, report))
-}
-
-/// Fits steps to the first frame.
-struct Fitting<'a> {
-    settings: &'a Settings,
-    fit: Fit,
-    /// Knows the order of the first frame.
-    ranking: Ranking,
-    /// Steps by the PSNR that they were fitted for, with the one that they were seen to have.
-    known: Vec<(f64, Steps, Option<f64>)>,
-    /// Views of the first frame that decide nothing, where these are the same when the stream is looked at.
-    unseen: Option<StripViews>,
-    /// How SH is coded: as the settings say, until a codebook turns out to cost pictures too much.
-    sh: ShChoice,
-    /// Whether values are fitted to pictures, where the settings say so.
-    fits_values: bool,
-}
-
-impl<'a> Fitting<'a> {
-    fn new(source: &mut dyn FrameSource, settings: &'a Settings) -> Result<Self, Error> {
-        let frame = read_first(source)?;
-        let Views { of_fit, unseen } = Views::of(&frame, settings);
-        let frame = coded_form(frame, settings);
-        // What is left out of the source is in its pictures.
-        let unseen = settings.prune.is_none().then_some(unseen);
-        // What is left out counts as an error.
-        let whole = match settings.prune {
-            Some(_) => {
-                let original = source.original(0).map_err(|source| Error::Source { frame: 0, source })?;
-                Some(coded_form(original, settings))
-            }
-            None => None,
-        };
-        let mut ranking = Ranking::new(settings);
-        let ranked = ranking.rank_first(&frame);
-        let fit = Fit::new((&frame, whole.as_ref()), &ranked, &of_fit, settings);
-        Ok(Self { settings, fit, ranking, known: Vec::new(), unseen, sh: settings.sh, fits_values: true })
-    }
-
-    /// What fitting values to pictures will bring, nearly, decibels: steps are looked for that much coarser from the start.
-    fn gain(&self) -> f64 {
-        let is_fitted = self.fits_values && !self.leaves_source();
-        self.settings.finetune.as_ref().filter(|_| is_fitted).map_or(0.0, |finetune| {
-            let [most, iterations] = GAIN;
-            let gain = most * (1.0 - libm::exp(-f64::from(finetune.iterations) / iterations));
-            gain * finetune.share_of_everything(self.settings)
-        })
-    }
-
-    /// Gives up a codebook with which pictures miss a PSNR, if nobody asked for one; whether there was one.
-    ///
-    /// The fit knows of coefficients only. What a codebook costs pictures beyond these, all other attributes would have to
-    /// make up for with finer steps, which takes more bits than the codebook saves.
-    fn gives_up_codebook(&mut self, report: &Report, missed: f64) -> bool {
-        let has_one = report.sh_codebook_entries > 0 && self.sh == ShChoice::Auto;
-        // Nor is it to blame for what fitting was to bring and did not.
-        let by_fitting = (self.gain() - gained(report)).max(0.0);
-        let is_dear = has_one && missed - by_fitting > NEAR_DECIBELS;
-        if is_dear {
-            self.sh = ShChoice::Coefficients;
-        }
-        is_dear
-    }
-
-    /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
-    /// ones.
-    fn at(&mut self, decibels: f64, source: &mut dyn FrameSource) -> Result<Settings, Error> {
-        let apart = |known: &&(f64, Steps, Option<f64>)| (known.0 - decibels).abs();
-        let nearest = self.known.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
-        let steps = match nearest.filter(|known| apart(known) <= ALIKE) {
-            Some((from, steps, _)) => self.fit.no_finer(finer(*steps, decibels - from)),
-            None => {
-                let again = || first_frame(source, self.settings);
-                let (steps, psnr) = self.fit.at(decibels as f32, again)?;
-                self.known.push((decibels, steps, psnr));
-                steps
-            }
-        };
-        let finetune = self.settings.finetune.clone().filter(|_| self.fits_values);
-        Ok(Settings { steps, laws: self.fit.laws(), sh: self.sh, finetune, ..self.settings.clone() })
-    }
-
-    /// What fitting has seen of the frame with the steps for a PSNR, if it has drawn it with just these.
-    fn tried(&self, decibels: f64) -> Option<Tried> {
-        let &(_, _, psnr) = self.known.iter().find(|known| known.0 == decibels)?;
-        Some(Tried { unseen: self.unseen.clone()?, psnr: psnr? })
-    }
-
-    /// Whether values will be fitted to photographs: they leave what pictures of the source show, by which steps are found.
-    fn leaves_source(&self) -> bool {
-        self.settings.finetune.as_ref().is_some_and(|finetune| !finetune.photographs.is_empty())
-    }
-
-    /// What laws save with the steps for a PSNR; not where time counts.
-    fn worth_of_laws(
-        &mut self,
-        decibels: f64,
-        source: &mut dyn FrameSource,
-    ) -> Result<Option<Saving>, Error> {
-        match self.settings.preset {
-            Preset::Fast => Ok(None),
-            Preset::Balanced | Preset::Small => {
-                let steps = self.at(decibels, source)?.steps;
-                self.fit.worth_of_laws(&steps)
-            }
-        }
-    }
 }
 
 /// Looks for the PSNR to fit for.
@@ -253,10 +143,25 @@ struct Encoded {
     report: Report,
 }
 
-/// The PSNR to fit for, and the stream that it gives, if all frames were encoded to find it.
+/// The PSNR to fit for, and what it gives.
 struct Found {
     fitted: f64,
+    /// What a Gaussian of the frames that were encoded to find it takes: see [`price`].
+    price: f64,
+    /// What fitting values to pictures has brought them, decibels, if it was done: the least of all frames.
+    gained: Option<f64>,
+    /// What a Gaussian of theirs takes, as a part of what one of an I frame does.
+    share_of_intra: f64,
+    /// The stream, if these were all frames.
     encoded: Option<Encoded>,
+}
+
+impl Found {
+    fn new(fitted: f64, encoded: Encoded, is_whole: bool) -> Self {
+        let report = &encoded.report;
+        let (price, gained, share_of_intra) = (price(report), gained(report), share_of_intra(report));
+        Self { fitted, price, gained, share_of_intra, encoded: is_whole.then_some(encoded) }
+    }
 }
 
 impl<'a> Seeker<'a> {
@@ -269,8 +174,59 @@ impl<'a> Seeker<'a> {
         Ok(Self { source, fitting, progress, encodings: 0, trials: 0 })
     }
 
-    /// What to fit for, so that the stream has what the settings ask for.
+    /// What to fit for, so that the stream has what the settings ask for, with values fitted to pictures only where that
+    /// takes fewer bits at equal PSNR.
+    ///
+    /// Of few Gaussians there may be nothing to gain, and what fitting was expected to bring was paid for with coarser steps. In a
+    /// sequence whose frames were trained apart, a fitted frame is farther from the next one.
     fn find(&mut self) -> Result<Found, Error> {
+        if self.fitting.settings.finetune.is_none() || self.fitting.leaves_source() {
+            return self.search();
+        }
+        let is_single = self.source.len() == 1;
+        // It takes a small part of the time, and shows whether frames are best predicted.
+        let before = (!is_single && self.may_lose()).then(|| self.search_plain()).transpose()?;
+        if let Some((plain, _)) = &before {
+            self.fitting.way.alone = Some(plain.share_of_intra > ALONE);
+        }
+        let fitted = self.search()?;
+        // Where there is nothing, nothing is fitted.
+        let Some(gained) = fitted.gained else { return Ok(fitted) };
+        let (plain, way) = match before {
+            Some(before) => before,
+            None if is_single && gained < DOUBTFUL_GAIN => self.search_plain()?,
+            None => return Ok(fitted),
+        };
+        // Where nothing was gained the values are those of the source, and a lower price is chance.
+        if gained <= 0.0 || plain.price < fitted.price {
+            self.fitting.way = way;
+            return Ok(plain);
+        }
+        Ok(fitted)
+    }
+
+    /// Whether frames that are predicted from fitted ones may be dearer. Only where nothing but the PSNR of all Gaussians counts
+    /// is it known what that is worth.
+    fn may_lose(&self) -> bool {
+        let settings = self.fitting.settings;
+        let is_plain = |finetune: &Finetune| {
+            finetune.loss == FinetuneLoss::SquaredError
+                && finetune.optimise_for.is_empty()
+                && finetune.held.is_empty()
+        };
+        settings.may_predict() && settings.finetune.as_ref().is_some_and(is_plain)
+    }
+
+    /// What to fit for with the values of the source, and how that is done.
+    fn search_plain(&mut self) -> Result<(Found, Way), Error> {
+        let plain = Way::new(false, self.fitting.settings);
+        let way = core::mem::replace(&mut self.fitting.way, plain);
+        let found = self.search()?;
+        Ok((found, core::mem::replace(&mut self.fitting.way, way)))
+    }
+
+    /// What to fit for, so that the stream has what the settings ask for.
+    fn search(&mut self) -> Result<Found, Error> {
         match (self.fitting.settings.size, self.fitting.settings.psnr) {
             (Some(size), _) => self.size(size),
             (None, Some(decibels)) => self.quality(decibels.into()),
@@ -288,34 +244,14 @@ impl<'a> Seeker<'a> {
             fitted: fitted as f32,
             encodings: self.encodings,
             trials: self.trials,
-            without_codebook: self.fitting.sh != self.fitting.settings.sh,
-            without_finetune: self.fitting.settings.finetune.is_some() && !self.fitting.fits_values,
+            without_codebook: self.fitting.way.sh != self.fitting.settings.sh,
+            without_finetune: self.fitting.settings.finetune.is_some() && !self.fitting.way.fits_values,
         }
-    }
-
-    /// What to fit for pictures of a PSNR, with values fitted to pictures only where that takes fewer bits.
-    ///
-    /// Of few Gaussians there may be nothing to gain, and what fitting was expected to bring was paid for with coarser steps.
-    fn quality(&mut self, wanted: f64) -> Result<Found, Error> {
-        let fitted = self.steps_for(wanted)?;
-        if !fitted.encoded.as_ref().is_some_and(|encoded| is_doubtful(&encoded.report)) {
-            return Ok(fitted);
-        }
-        let (sh, known) = (self.fitting.sh, core::mem::take(&mut self.fitting.known));
-        (self.fitting.fits_values, self.fitting.sh) = (false, self.fitting.settings.sh);
-        let plain = self.steps_for(wanted)?;
-        // Where nothing was gained the values are those of the source, and a lower price is chance.
-        let is_idle = fitted.encoded.as_ref().is_some_and(|encoded| gained(&encoded.report) <= 0.0);
-        if is_idle || price(&plain, wanted) < price(&fitted, wanted) {
-            return Ok(plain);
-        }
-        (self.fitting.fits_values, self.fitting.sh, self.fitting.known) = (true, sh, known);
-        Ok(fitted)
     }
 
     /// What to fit for pictures of a PSNR. Of a sequence its first frames are tried. What will be fitted to photographs is tried
     /// as it is before that.
-    fn steps_for(&mut self, wanted: f64) -> Result<Found, Error> {
+    fn quality(&mut self, wanted: f64) -> Result<Found, Error> {
         let mut secant = Secant::new(wanted + ABOVE, NEAR_DECIBELS, 1.0, MOST_FOR_PSNR);
         let frames_of_part = self.frames_of_part_for_psnr();
         let predicted = frames_of_part.min(self.source.len()).saturating_sub(1);
@@ -345,7 +281,7 @@ impl<'a> Seeker<'a> {
                 break;
             }
             if secant.take(at, measured) {
-                best = Some(Found { fitted: at, encoded: (!in_part).then_some(encoded) });
+                best = Some(Found::new(at, encoded, !in_part));
             }
             next = secant.next();
         }
@@ -377,7 +313,7 @@ impl<'a> Seeker<'a> {
             let encoded = self.kept(at)?;
             let measured = size_of(size, encoded.report.bytes as f64, encoded.report.gaussians as f64);
             if secant.take(at, libm::log(measured)) {
-                best = Some(Found { fitted: at, encoded: Some(encoded) });
+                best = Some(Found::new(at, encoded, true));
             }
             next = secant.next();
         }
@@ -387,7 +323,8 @@ impl<'a> Seeker<'a> {
     /// No more than a GOP has, and one where none is predicted from others.
     fn frames_of_part_for_psnr(&self) -> u32 {
         let settings = self.fitting.settings;
-        if settings.temporal_layers() == 0 { 1 } else { PART_FOR_PSNR.min(settings.gop) }
+        let stand_alone = settings.temporal_layers() == 0 || self.fitting.way.alone == Some(true);
+        if stand_alone { 1 } else { PART_FOR_PSNR.min(settings.gop) }
     }
 
     fn frames_of_part_for_size(&self) -> u32 {
@@ -421,6 +358,10 @@ impl<'a> Seeker<'a> {
     fn whole(&mut self, fitted: f64, sink: &mut dyn Write) -> Result<Report, Error> {
         self.encodings += 1;
         let (settings, ranking) = (self.fitting.at(fitted, self.source)?, self.fitting.ranking.clone());
+        if let Some(stands_alone) = self.fitting.way.alone {
+            let report = encode_once(self.source, &settings, ranking, sink, self.progress)?;
+            return Ok(Report { stands_alone, ..report });
+        }
         let tried = self.fitting.tried(fitted);
         encode_smaller(self.source, &settings, (ranking, tried), sink, self.progress)
     }
@@ -446,10 +387,9 @@ impl<'a> Seeker<'a> {
     }
 }
 
-/// What fitting values to pictures has brought, decibels: the least of all frames.
-fn gained(report: &Report) -> f64 {
-    let gains = report.finetuned.iter().map(|fitted| fitted.psnr[1] - fitted.psnr[0]);
-    gains.min_by(f64::total_cmp).unwrap_or(0.0)
+/// What fitting values to pictures has brought, decibels: the least of all frames, if any was fitted.
+fn gained(report: &Report) -> Option<f64> {
+    report.finetuned.iter().map(|fitted| fitted.psnr[1] - fitted.psnr[0]).min_by(f64::total_cmp)
 }
 
 /// Whether any frame refers to another.
@@ -457,16 +397,11 @@ fn is_predicted(report: &Report) -> bool {
     report.coded.iter().any(|frame| frame.frame_type != FrameType::Intra)
 }
 
-/// Whether a single frame may be as good without fitting.
-fn is_doubtful(report: &Report) -> bool {
-    report.frames == 1 && !report.finetuned.is_empty() && gained(report) < DOUBTFUL_GAIN
-}
-
-/// The logarithm of the bytes that a stream would take at a PSNR.
-fn price(found: &Found, wanted: f64) -> f64 {
-    let Some(Encoded { report, .. }) = &found.encoded else { return f64::INFINITY };
-    let psnr = report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr()).unwrap_or(wanted);
-    libm::log(report.bytes.max(1) as f64) + GROWTH * (wanted - psnr)
+/// The logarithm of what a Gaussian of encoded frames would take at a PSNR that is the same for all.
+fn price(report: &Report) -> f64 {
+    let psnr = report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr()).unwrap_or(0.0);
+    let gaussians: u64 = report.coded.iter().map(|frame| u64::from(frame.gaussians)).sum();
+    libm::log(report.bytes.max(1) as f64 / gaussians.max(1) as f64) - GROWTH * psnr
 }
 
 /// A size in the unit that it is asked for in; never 0.

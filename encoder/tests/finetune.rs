@@ -16,6 +16,7 @@ use splatstream_encoder::{
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
+use splatstream_gaussians::random::SplitMix64;
 use splatstream_render::camera::{Up, held_out, ring};
 use splatstream_render::metrics::ssim;
 use splatstream_render::{Image, ReferencePictures, render};
@@ -306,6 +307,45 @@ fn predicted_frames_follow_the_values_that_an_i_frame_was_fitted_to() {
     assert!(with.iter().zip(&without).all(|(with, without)| with > without), "{without:?} {with:?}");
     let (_, intra) = encoded(moving(2), &settings(2));
     assert_eq!(intra.finetuned.iter().map(|report| report.frame).collect::<Vec<_>>(), [0, 1]);
+}
+
+/// Frames of which each has errors of its own, as from training apart.
+fn apart(count: u32, spread: f32) -> Vec<GaussianFrame> {
+    let mut random = SplitMix64::new(7);
+    let mut shift = |plane: &mut [f32], most: f32| {
+        plane.iter_mut().for_each(|value| *value += spread * most * random.signed());
+    };
+    let mut apart = |mut frame: GaussianFrame| {
+        let planes = frame.planes_mut();
+        planes.log_scale.into_iter().for_each(|plane| shift(plane, 0.15));
+        shift(planes.opacity_logit, 0.5);
+        planes.dc.into_iter().chain(planes.rotation).for_each(|plane| shift(plane, 0.15));
+        planes.sh.into_iter().for_each(|plane| shift(plane, 0.05));
+        frame
+    };
+    moving(count).into_iter().map(&mut apart).collect()
+}
+
+#[test]
+fn fitting_is_given_up_where_predicted_frames_lose_by_it() {
+    let wanted = |settings: Settings| Settings { psnr: Some(44.0), ..predicted(settings) };
+    let (before, _) = encoded(apart(3, 1.0), &wanted(plain()));
+    let (after, report) = encoded(apart(3, 1.0), &wanted(settings(20)));
+    assert!(report.target.unwrap().without_finetune, "{:?}", report.finetuned);
+    assert_eq!(before, after);
+}
+
+#[test]
+fn every_frame_is_fitted_where_predicting_saves_little() {
+    let wanted = |settings: Settings| Settings { psnr: Some(44.0), ..predicted(settings) };
+    let (before, plain) = encoded(apart(3, 4.0), &wanted(plain()));
+    let (after, report) = encoded(apart(3, 4.0), &wanted(settings(20)));
+    assert!(!plain.stands_alone && report.stands_alone, "predicting frames saves more or nothing");
+    assert_eq!(report.finetuned.iter().map(|report| report.frame).collect::<Vec<_>>(), [0, 1, 2]);
+    // More than what coarser steps with as many decibels less would save.
+    let lost = fitted_psnr(&plain) - fitted_psnr(&report);
+    let share = after.len() as f64 / before.len() as f64;
+    assert!(share < (-0.045 * lost).exp(), "{share} of the bytes, {lost} dB less");
 }
 
 #[test]

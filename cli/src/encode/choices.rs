@@ -324,21 +324,21 @@ fn network(report: &Report, settings: &Settings) -> Option<Choice> {
 /// Whether values are fitted to pictures, where that was asked for or belongs to the preset.
 fn fitting(report: &Report, settings: &Settings) -> Option<Choice> {
     let belongs = settings.preset == Preset::Small;
+    let stands_alone = report.stands_alone || settings.structure == Structure::Intra;
     let (choice, why) = match (&settings.finetune, settings.structure) {
         (Some(_), _) if report.target.is_some_and(|target| target.without_finetune) => {
-            ("none".to_owned(), "pictures gain next to nothing by it: without, the stream is smaller")
+            ("none".to_owned(), "without, the stream takes fewer bytes at equal PSNR")
         }
-        (Some(finetune), structure) => {
+        (Some(finetune), _) => {
             let loss = match finetune.loss {
                 FinetuneLoss::SquaredError => "squared error",
                 FinetuneLoss::L1Ssim { .. } => "L1 and SSIM",
             };
             let choice = format!("{}, {loss}", counted(finetune.iterations.into(), "iteration"));
-            let why = match structure {
-                Structure::Intra => "values of frames are chosen by pictures",
-                Structure::Predicted { .. } => {
-                    "values of I frames are chosen by pictures, and frames that are predicted from them follow"
-                }
+            let why = if stands_alone {
+                "values of frames are chosen by pictures"
+            } else {
+                "values of I frames are chosen by pictures, and frames that are predicted from them follow"
             };
             (choice, why)
         }

@@ -231,7 +231,8 @@ fn short_gops(report: &Report, settings: &Settings) -> Option<Warning> {
 /// A time in which fitting to pictures came to nothing: too short for an iteration, or for one that gains anything.
 fn short_time(report: &Report, settings: &Settings) -> Option<Warning> {
     let budget = settings.finetune.as_ref()?.time_budget?;
-    let is_given_up = report.target.is_some_and(|target| target.without_finetune);
+    // In a sequence, more than the time counts.
+    let is_given_up = report.frames == 1 && report.target.is_some_and(|target| target.without_finetune);
     let is_idle = report.finetuned.iter().any(|fitted| fitted.iterations == 0);
     let message = format!(
         "--finetune came to nothing in the {} seconds of --time-budget, which may have been over before the first iteration: give \
