@@ -400,8 +400,7 @@ fn is_predicted(report: &Report) -> bool {
 /// The logarithm of what a Gaussian of encoded frames would take at a PSNR that is the same for all.
 fn price(report: &Report) -> f64 {
     let psnr = report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr()).unwrap_or(0.0);
-    let gaussians: u64 = report.coded.iter().map(|frame| u64::from(frame.gaussians)).sum();
-    libm::log(report.bytes.max(1) as f64 / gaussians.max(1) as f64) - GROWTH * psnr
+    libm::log(report.bytes.max(1) as f64 / report.gaussians.max(1) as f64) - GROWTH * psnr
 }
 
 /// A size in the unit that it is asked for in; never 0.
