@@ -81,6 +81,7 @@ impl Plan {
         let analysis = analyse(source, &settings)?;
         let ranking = looking(source, ranking, &settings)?;
         let network = learning::network(source, &settings, &analysis)?;
+        let stands_alone = asked.may_predict() && !settings.may_predict();
         let (asked, ranking) = (asked.clone(), Some(ranking));
         Ok(Self {
             asked,
@@ -90,7 +91,7 @@ impl Plan {
             ranking,
             target: None,
             tried: None,
-            stands_alone: false,
+            stands_alone,
             frame_digests: Vec::new(),
         })
     }
@@ -114,7 +115,7 @@ impl Plan {
     pub(crate) fn alone(&self, source: &mut dyn FrameSource) -> Result<Self, Error> {
         let (settings, ranking) = (self.settings.clone().alone(), self.ranking(source, true)?);
         let plan = Self::new(source, &self.asked, settings, ranking)?;
-        Ok(Self { target: self.target, stands_alone: true, ..plan })
+        Ok(Self { target: self.target, ..plan })
     }
 
     /// The plan with frames that stand for themselves, if the first GOP is smaller with it. `coded` and `report`: the first

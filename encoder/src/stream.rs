@@ -77,9 +77,10 @@ fn planned(source: &mut dyn FrameSource, asked: &Settings) -> Result<Plan, Error
         return Plan::new(source, asked, asked.clone(), Ranking::new(asked));
     }
     let (settings, ranking, found) = target::fit(source, asked)?;
+    let may_predict = settings.may_predict();
     let mut plan = Plan::new(source, asked, settings, ranking)?;
     let Some(first) = plan.spans(0..source.len()).next() else { return Ok(plan) };
-    if asked.may_predict() {
+    if may_predict {
         let (coded, report) = plan.code(source, first)?;
         if let Some(alone) = plan.better_alone(source, &coded, &report)? {
             plan = alone;

@@ -10,8 +10,8 @@ use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
 use splatstream_encoder::{
-    Attribute, Error, Finetune, FinetuneLoss, FinetuneProgress, FinetuneWatch, Photograph, PointReport,
-    PointWeight, Preset, Report, Settings, Structure, encode,
+    Attribute, Error, Finetune, FinetuneLoss, FinetuneProgress, FinetuneWatch, Photograph, Plan, PointReport,
+    PointWeight, Preset, Report, Settings, Structure, encode, plan,
 };
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_format::payload::SceneDescription;
@@ -346,6 +346,21 @@ fn every_frame_is_fitted_where_predicting_saves_little() {
     let lost = fitted_psnr(&plain) - fitted_psnr(&report);
     let share = after.len() as f64 / before.len() as f64;
     assert!(share < (-0.045 * lost).exp(), "{share} of the bytes, {lost} dB less");
+}
+
+#[test]
+fn a_plan_of_frames_that_stand_for_themselves_when_fitted_is_read_as_it_was_made() {
+    let asked = Settings { psnr: Some(44.0), ..predicted(settings(20)) };
+    let made = plan(&mut apart(3, 4.0), &asked).unwrap();
+    let read = Plan::from_record(&made.record().unwrap(), &asked).unwrap();
+    let shard = |plan: &Plan| {
+        let mut bytes = Vec::new();
+        let report = plan.encode_shard(&mut apart(3, 4.0), (1, 1), &mut bytes, &mut |_, _| ()).unwrap();
+        (bytes, report.stands_alone)
+    };
+    let (bytes, stands_alone) = shard(&made);
+    assert!(stands_alone);
+    assert!(shard(&read) == (bytes, stands_alone));
 }
 
 #[test]
