@@ -1,30 +1,40 @@
-//! Gaussians leave a frame one after the other, those first that pictures miss least.
+//! Removes the Gaussians of a frame one after the other, those first that pictures miss least.
 //!
-//! What pictures lose without a Gaussian says nothing of what they lose without its neighbours as well: where many overlap, each of
-//! them is missed little, and all of them together would leave a hole. So what is lost without a Gaussian rises as its
-//! neighbours go, from what is lost without it alone to what it would show before a background.
+//! What pictures lose without a Gaussian says nothing of what they lose without its neighbours as well: where many overlap,
+//! pictures miss each of them little, but all of them together would leave a hole. So what is lost without a Gaussian rises as
+//! its neighbours are removed, from what is lost without it alone to what it would show before a background.
+//!
+//! Neighbours are near each other on a Morton curve. The curve is cut into parts that fit into the cache of a core, and all
+//! parts are thinned in parallel, each as if its neighbours in other parts stayed. The results are merged by the level of the
+//! score at removal; within a level, the parts take turns.
+
+mod part;
 
 use super::volume;
 use crate::quantile;
+use part::{PART, Part};
 use rayon::prelude::*;
 use splatstream_decoder::position::morton;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::contribution::Worth;
 
-/// Neighbours are those so many places before and after on a Morton curve.
-const REACH: usize = 4;
-/// What is lost without a Gaussian none of whose neighbours is left, of its energy: the mean of what colours of three channels differ
-/// by, squared, is of this order.
-const ALONE: f64 = 1.5;
-/// Bits of a score that make scores different: sixteen from one power of two to the next.
-const DROPPED_BITS: u32 = 19;
-/// Scores that can be told apart, which are positive.
-const LEVELS: usize = 1 << (31 - DROPPED_BITS);
-
 /// What is left of a frame, in the order of a curve through space.
 pub(super) struct Thinning<'a> {
     frame: &'a GaussianFrame,
     along: Vec<u32>,
+}
+
+/// The removal of a Gaussian. Removals happen in ascending order.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+struct Removal {
+    /// The level of its score at that time.
+    level: u16,
+    /// How many Gaussians of its part are removed before it at this level.
+    turn: u16,
+    /// The number of its part with the bits reversed, so that parts which take turns lie far apart.
+    part: u32,
+    /// Its index on the curve.
+    index: u32,
 }
 
 impl<'a> Thinning<'a> {
@@ -44,129 +54,53 @@ impl<'a> Thinning<'a> {
     /// each row of the frame if none but those that are left are there. What they show nothing of goes before all else, the least
     /// opacity times volume first.
     ///
-    /// Scores only rise, so that a queue with a line for each level of them is enough: whoever is next in the lowest line goes,
-    /// unless neighbours have gone since and raised its score to another level. Lines are filled so that those that come one
-    /// after the other lie far apart.
-    #[expect(
-        clippy::indexing_slicing,
-        reason = "places are those of the Gaussians that are left, levels below the highest"
-    )]
+    /// Equal on every machine and for any number of threads.
+    #[expect(clippy::indexing_slicing, reason = "rows are those of the frame, indices those of what is left")]
     pub(super) fn leave(&mut self, shown: &[Worth], count: usize) -> Vec<u32> {
-        let mut left = Left::new(self.along.iter().map(|&row| shown[row as usize]).collect());
-        let mut lines = self.queue(&left);
-        let going = left.len().saturating_sub(count);
-        let mut gone = Vec::with_capacity(going);
-        for level in 0..LEVELS {
-            if gone.len() == going {
-                break;
-            }
-            for place in core::mem::take(&mut lines[level]) {
-                let now = usize::from(left.level(place as usize));
-                if now > level {
-                    lines[now].push(place);
-                } else if gone.len() < going {
-                    left.remove(place as usize);
-                    gone.push(self.along[place as usize]);
-                }
-            }
-        }
-        let mut places = 0..;
-        self.along.retain(|_| places.next().is_some_and(|place| left.has(place)));
-        gone.reverse();
+        let worth: Vec<Worth> = self.along.par_iter().map(|&row| shown[row as usize]).collect();
+        let mut indices = self.unseen(&worth);
+        indices.extend(seen(&worth).into_iter().map(|removal| removal.index));
+        indices.truncate(worth.len().saturating_sub(count));
+        let gone = indices.iter().rev().map(|&index| self.along[index as usize]).collect();
+        let mut stays = vec![true; worth.len()];
+        indices.into_iter().for_each(|index| stays[index as usize] = false);
+        let mut stays = stays.into_iter();
+        self.along.retain(|_| stays.next().unwrap_or(true));
         gone
     }
 
-    /// A line of places for each level, those first that go first.
-    #[expect(
-        clippy::indexing_slicing,
-        reason = "places are those of the Gaussians that are left, levels below the highest"
-    )]
-    fn queue(&self, left: &Left) -> Vec<Vec<u32>> {
-        let mut lines = vec![Vec::new(); LEVELS];
-        let unseen = (0..left.len() as u32).into_par_iter().filter(|&place| !left.is_seen(place as usize));
+    /// The indices of the Gaussians that no picture shows, in ascending order of opacity times volume.
+    fn unseen(&self, worth: &[Worth]) -> Vec<u32> {
+        let unseen = worth.par_iter().zip(&self.along).zip(0..worth.len() as u32);
+        let unseen = unseen.filter(|((worth, _), _)| !is_seen(worth));
         let mut by_volume: Vec<(f64, u32)> =
-            unseen.map(|place| (volume(self.frame, self.along[place as usize]), place)).collect();
+            unseen.map(|((_, &row), index)| (volume(self.frame, row), index)).collect();
         by_volume.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        lines[0].extend(by_volume.into_iter().map(|(_, place)| place));
-        let levels: Vec<u16> = (0..left.len()).into_par_iter().map(|place| left.level(place)).collect();
-        for place in far_apart(left.len()).filter(|&place| left.is_seen(place as usize)) {
-            lines[usize::from(levels[place as usize])].push(place);
-        }
-        lines
+        by_volume.into_iter().map(|(_, index)| index).collect()
     }
 }
 
-/// Gaussians along a curve, some of which have gone.
-struct Left {
-    worth: Vec<Worth>,
-    /// What each gives, 0 if it has gone; with as many zeros at both ends as a neighbourhood reaches.
-    given: Vec<f32>,
-    /// What the neighbours of each gave when all were there.
-    around: Vec<f32>,
-    gone: Vec<bool>,
+/// Whether pictures show anything of a Gaussian.
+fn is_seen(worth: &Worth) -> bool {
+    worth.contribution > 0.0
 }
 
-#[expect(
-    clippy::indexing_slicing,
-    reason = "places are those of the Gaussians, and neighbourhoods end within zeros"
-)]
-#[expect(clippy::arithmetic_side_effects, reason = "places of Gaussians in memory")]
-impl Left {
-    fn new(worth: Vec<Worth>) -> Self {
-        let zeros = || [0.0; REACH].into_iter();
-        let given: Vec<f32> =
-            zeros().chain(worth.iter().map(|worth| worth.contribution as f32)).chain(zeros()).collect();
-        let around = (0..worth.len()).into_par_iter().map(|place| sum_around(&given, place)).collect();
-        let gone = vec![false; worth.len()];
-        Self { worth, given, around, gone }
-    }
-
-    fn len(&self) -> usize {
-        self.worth.len()
-    }
-
-    fn has(&self, place: usize) -> bool {
-        !self.gone[place]
-    }
-
-    fn is_seen(&self, place: usize) -> bool {
-        self.worth[place].contribution > 0.0
-    }
-
-    fn remove(&mut self, place: usize) {
-        self.given[place + REACH] = 0.0;
-        self.gone[place] = true;
-    }
-
-    /// The level of the score of a Gaussian: of the geometric mean of what it gives and of what is lost without it.
-    ///
-    /// Most neighbours must have gone until much of what is behind them shows, hence the third power of their share.
-    fn level(&self, place: usize) -> u16 {
-        let Worth { contribution, loss, energy } = self.worth[place];
-        let around = self.around[place];
-        let missing =
-            if around > 0.0 { 1.0 - f64::from(sum_around(&self.given, place) / around) } else { 0.0 };
-        let lost = loss + missing.powi(3) * (ALONE * energy - loss).max(0.0);
-        // What is beyond numbers has no sign, and is the highest.
-        (((contribution * lost).sqrt() as f32).abs().to_bits() >> DROPPED_BITS) as u16
-    }
-}
-
-/// What the neighbours of a place give.
-#[expect(clippy::indexing_slicing, reason = "neighbourhoods end within zeros")]
-#[expect(clippy::arithmetic_side_effects, reason = "places of Gaussians in memory")]
-fn sum_around(given: &[f32], place: usize) -> f32 {
-    let window = &given[place..=place + 2 * REACH];
-    let sum = |side: &[f32]| side.iter().sum::<f32>();
-    sum(&window[..REACH]) + sum(&window[REACH + 1..])
-}
-
-/// All places, so that each next one is far from those before: by the bits of their numbers from the last to the first.
-#[expect(clippy::arithmetic_side_effects, reason = "counts of Gaussians in memory")]
-fn far_apart(count: usize) -> impl Iterator<Item = u32> {
-    let bits = count.next_power_of_two().trailing_zeros().max(1);
-    let places = (0..1_u32 << bits).map(move |number| number.reverse_bits() >> (32 - bits));
-    places.filter(move |&place| (place as usize) < count)
+/// The removals of all Gaussians that pictures show, in order.
+#[expect(clippy::arithmetic_side_effects, reason = "indices of Gaussians in memory")]
+fn seen(worth: &[Worth]) -> Vec<Removal> {
+    let of_part = |(number, worth): (usize, &[Worth])| -> Vec<Removal> {
+        let (number, first) = (number as u32, (number * PART) as u32);
+        let removal = |(level, turn, index): (u16, u16, u16)| Removal {
+            level,
+            turn,
+            part: number.reverse_bits(),
+            index: first + u32::from(index),
+        };
+        Part::new(worth).removals().into_iter().map(removal).collect()
+    };
+    let mut all: Vec<Removal> = worth.par_chunks(PART).enumerate().flat_map_iter(of_part).collect();
+    all.par_sort_unstable();
+    all
 }
 
 /// The rows of a frame along a Morton curve. Space far from most of the Gaussians is drawn together, so that few of them
@@ -199,12 +133,13 @@ fn along_curve(frame: &GaussianFrame) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
+    use super::part::REACH;
     use super::*;
     use splatstream_files::builtin::BuiltinScene;
 
     /// Gaussians in a row, of which each shows as much.
     fn row(count: usize) -> (GaussianFrame, Vec<Worth>) {
-        let scene = BuiltinScene { gaussians: 256, ..BuiltinScene::default() };
+        let scene = BuiltinScene { gaussians: count.max(256) as u32, ..BuiltinScene::default() };
         let mut frame = scene.frame(0).select(&(0..count as u32).collect::<Vec<_>>());
         for (axis, plane) in frame.planes_mut().position.into_iter().enumerate() {
             plane.iter_mut().zip(0..).for_each(|(x, row)| *x = if axis == 0 { row as f32 } else { 0.0 });
@@ -227,6 +162,19 @@ mod tests {
     }
 
     #[test]
+    fn parts_of_the_curve_take_turns() {
+        let count = 2 * PART + 1000;
+        let (frame, shown) = row(count);
+        let mut left = Thinning::new(&frame);
+        left.leave(&shown, count / 4);
+        let kept = left.rows();
+        let widest = kept.windows(2).map(|pair| pair[1] - pair[0]).max();
+        assert!(widest <= Some(2 * REACH as u32), "{widest:?}");
+        let of_part = |part: usize| kept.iter().filter(|&&row| row as usize / PART == part).count();
+        assert!(of_part(0).abs_diff(of_part(1)) <= 1, "{} {}", of_part(0), of_part(1));
+    }
+
+    #[test]
     fn what_shows_more_stays() {
         let (frame, mut shown) = row(8);
         shown.iter_mut().step_by(2).for_each(|worth| worth.contribution = 4.0);
@@ -245,13 +193,6 @@ mod tests {
         shown[5].loss = 0.0;
         let order = Thinning::new(&frame).leave(&shown, 0);
         assert_eq!(order[2..], [2, 3, 4, 1]);
-    }
-
-    #[test]
-    fn places_come_once_each_and_halves_between_them() {
-        assert_eq!(far_apart(5).collect::<Vec<_>>(), [0, 4, 2, 1, 3]);
-        assert_eq!(far_apart(1).collect::<Vec<_>>(), [0]);
-        assert_eq!(far_apart(0).count(), 0);
     }
 
     #[test]
