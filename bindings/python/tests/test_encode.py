@@ -91,7 +91,7 @@ def test_a_state_of_fitting_goes_when_the_stream_is_written(frames: list[gss.Gau
     assert bytes(kept) == bytes(gss.encode(frames[0], **options))
     assert not state.exists()
     state.mkdir()
-    (state / "settings").touch()
+    (state / "frame-0000-layer-0.fit").touch()
     with pytest.raises(ValueError, match="an earlier run has left its state"):
         gss.encode(frames[0], finetune_state=state, **options)
 

@@ -76,6 +76,7 @@ fn write_files(directory: &Path) {
     {
         fs::create_dir(directory.join(folder)).unwrap();
         write(&format!("{folder}/settings"), settings.as_bytes());
+        write(&format!("{folder}/frame-0000-layer-0.fit"), b"");
     }
 }
 

@@ -106,3 +106,19 @@ fn who_resumes_where_nothing_was_left_begins() {
     assert_eq!(report["finetuned"].as_array().map(Vec::len), plain["finetuned"].as_array().map(Vec::len));
     assert!(!state.exists());
 }
+
+#[test]
+fn what_is_refused_leaves_no_state() {
+    let directory = directory();
+    let (path, state) = (directory.path().join("scene.ply"), directory.path().join("state"));
+    let mut frame = BuiltinScene { gaussians: 100, ..BuiltinScene::default() }.frame(0);
+    frame.planes_mut().dc[0][7] = f32::NAN;
+    fs::write(&path, ply::write(&frame)).unwrap();
+    let stream = directory.path().join("scene.gss");
+    let arguments = ["encode", text(&path), "-o", text(&stream), "--finetune", "1", "--psnr", "40"];
+    let arguments = [&arguments[..], &["--finetune-state", text(&state)]].concat();
+    fail(1, &arguments);
+    assert!(!state.exists());
+    json(&[&arguments[..], &["--drop-invalid"]].concat());
+    assert!(!state.exists());
+}

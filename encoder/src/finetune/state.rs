@@ -62,8 +62,9 @@ pub struct FinetuneState(Option<Arc<Kept>>);
 /// A directory with a state.
 struct Kept {
     directory: PathBuf,
-    /// What distinguishes the settings.
+    /// What distinguishes the settings, and the text of their file.
     settings: u64,
+    text: String,
     /// The files of fits that an earlier run has left.
     found: BTreeSet<String>,
     /// Those that this one has asked for.
@@ -71,26 +72,22 @@ struct Kept {
 }
 
 impl FinetuneState {
-    /// In a directory without one, for a run with these settings.
+    /// In a directory without one, for a run with these settings. Nothing is written before the first fit begins: what is refused
+    /// before leaves nothing.
     pub(super) fn create_for(directory: &Path, settings: &[Named]) -> Result<Self, StateError> {
         let state = Kept::open(directory, settings)?;
-        if !state.found.is_empty() || directory.join(SETTINGS).exists() {
-            return Err(StateError::Exists { directory: directory.to_path_buf() });
+        match state.found.is_empty() {
+            true => Ok(Self(Some(Arc::new(state)))),
+            false => Err(StateError::Exists { directory: directory.to_path_buf() }),
         }
-        state.begin(settings)
     }
 
-    /// As an earlier run with these settings has left it, or new.
+    /// As an earlier run with these settings has left it, or new where it has left no fit.
     pub(super) fn resume_for(directory: &Path, settings: &[Named]) -> Result<Self, StateError> {
         let state = Kept::open(directory, settings)?;
-        let path = directory.join(SETTINGS);
-        if !path.exists() {
-            return match state.found.is_empty() {
-                true => state.begin(settings),
-                false => Err(damaged(directory, "its settings are not there")),
-            };
+        if !state.found.is_empty() {
+            state.check(settings)?;
         }
-        state.check(&path, settings)?;
         Ok(Self(Some(Arc::new(state))))
     }
 
@@ -104,7 +101,7 @@ impl FinetuneState {
         let own = core::mem::take(&mut *kept.own.lock().unwrap_or_else(PoisonError::into_inner));
         own.iter().map(|name| kept.directory.join(name)).filter(|path| path.exists()).try_for_each(remove)?;
         // Another run, of another part of the sequence, may keep its fits beside.
-        if fits_in(&kept.directory)?.is_empty() {
+        if !own.is_empty() && fits_in(&kept.directory)?.is_empty() {
             remove(kept.directory.join(SETTINGS))?;
             let _others_are_in_it = fs::remove_dir(&kept.directory);
         }
@@ -120,7 +117,7 @@ impl FinetuneState {
     /// from what `key` distinguishes. None where no state is kept.
     ///
     /// # Errors
-    /// An earlier run has read a frame of that number with other values.
+    /// An earlier run has read a frame of that number with other values; the directory cannot be written.
     pub(super) fn entry(
         &self,
         (frame, source): (u32, u64),
@@ -137,39 +134,45 @@ impl FinetuneState {
         let key = digest_of(&(kept.settings, key, layer));
         let name = format!("{of_source}layer-{layer}-{key:016x}{OF_FIT}");
         let entry = Entry::new(kept.directory.join(&name), key);
-        kept.own.lock().unwrap_or_else(PoisonError::into_inner).insert(name);
+        let mut own = kept.own.lock().unwrap_or_else(PoisonError::into_inner);
+        if own.is_empty() {
+            kept.begin()?;
+        }
+        own.insert(name);
         Ok(Some(entry))
     }
 }
 
 impl Kept {
-    /// What is in a directory, which is made if it is not there.
+    /// What is in a directory, if it is there.
     fn open(directory: &Path, settings: &[Named]) -> Result<Self, StateError> {
-        let failed = |source| StateError::File { path: directory.to_path_buf(), what: "kept", source };
-        fs::create_dir_all(directory).map_err(failed)?;
+        let mut text = format!("{FORMAT}\n");
+        settings.iter().for_each(|(name, value)| text += &format!("{name}: {value}\n"));
         Ok(Self {
             directory: directory.to_path_buf(),
             settings: digest_of(&settings),
+            text,
             found: fits_in(directory)?,
             own: Mutex::default(),
         })
     }
 
-    /// Writes down what the state belongs to.
-    fn begin(self, settings: &[Named]) -> Result<FinetuneState, StateError> {
-        let mut text = format!("{FORMAT}\n");
-        settings.iter().for_each(|(name, value)| text += &format!("{name}: {value}\n"));
-        replace(&self.directory.join(SETTINGS), |file| file.write_all(text.as_bytes()))?;
-        Ok(FinetuneState(Some(Arc::new(self))))
+    /// Makes the directory, and writes down what the state belongs to.
+    fn begin(&self) -> Result<(), StateError> {
+        let failed = |source| StateError::File { path: self.directory.clone(), what: "kept", source };
+        fs::create_dir_all(&self.directory).map_err(failed)?;
+        replace(&self.directory.join(SETTINGS), |file| file.write_all(self.text.as_bytes()))
     }
 
     /// Whether the state belongs to these settings.
-    fn check(&self, path: &Path, settings: &[Named]) -> Result<(), StateError> {
+    fn check(&self, settings: &[Named]) -> Result<(), StateError> {
+        let path = self.directory.join(SETTINGS);
         let failed = |source: io::Error| match source.kind() {
             io::ErrorKind::InvalidData => damaged(&self.directory, "its settings are not text"),
-            _ => StateError::File { path: path.to_path_buf(), what: "read", source },
+            io::ErrorKind::NotFound => damaged(&self.directory, "its settings are not there"),
+            _ => StateError::File { path: path.clone(), what: "read", source },
         };
-        let text = fs::read_to_string(path).map_err(failed)?;
+        let text = fs::read_to_string(&path).map_err(failed)?;
         if !text.ends_with('\n') {
             return Err(damaged(&self.directory, "its settings are cut"));
         }
@@ -190,11 +193,15 @@ impl Kept {
     }
 }
 
-/// The names of the files of fits in a directory.
+/// The names of the files of fits in a directory; none where it is not there.
 fn fits_in(directory: &Path) -> Result<BTreeSet<String>, StateError> {
     let failed = |source| StateError::File { path: directory.to_path_buf(), what: "read", source };
     let name = |entry: io::Result<fs::DirEntry>| entry.map(|entry| entry.file_name());
-    let names = fs::read_dir(directory).map_err(failed)?.map(name).collect::<Result<Vec<_>, _>>();
+    let entries = match fs::read_dir(directory) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(BTreeSet::new()),
+        entries => entries.map_err(failed)?,
+    };
+    let names = entries.map(name).collect::<Result<Vec<_>, _>>();
     let names = names.map_err(failed)?.into_iter().filter_map(|name| name.into_string().ok());
     Ok(names.filter(|name| name.starts_with("frame-") && name.ends_with(OF_FIT)).collect())
 }
