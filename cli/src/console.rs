@@ -74,7 +74,8 @@ impl Console {
         self.report(report, text)
     }
 
-    /// The same for a result of any length, which is written as it comes; JSON without indentation.
+    /// The same for a result of any length, which is written as it comes; JSON without indentation. What is found while it is written
+    /// is found without a report, too.
     pub(crate) fn stream(
         &self,
         report: &impl Serialize,
@@ -82,7 +83,7 @@ impl Console {
     ) -> Result<(), Failure> {
         self.has_printed.store(true, Ordering::Relaxed);
         if self.quiet && !self.json {
-            return Ok(());
+            return written(text(&mut io::sink()));
         }
         let mut out = BufWriter::with_capacity(1 << 16, io::stdout().lock());
         let result = match self.json {

@@ -115,6 +115,12 @@ impl Decode {
             return Err(failure);
         }
         let verdict = summary.verdict();
+        if verdict.is_none() && announced > 0 && decoding.shown.len() == 0 {
+            let (path, point) = (stream.path.display(), options.operating_point);
+            return Err(Failure::Usage(format!(
+                "{path}: none of these frames is at the operating point {point}; give others with --frames, or another with --op"
+            )));
+        }
         let loss = Loss::new(&stream, announced, &options, &summary, frames, &decoding.shown.indices());
         let mut report = Report { seek, ..self.report(decoding, loss, announced, total) };
         match target {

@@ -69,7 +69,7 @@ pub(super) fn show(stream: &StreamFile, options: &Options, console: &Console) ->
     let qualities = qualities(stream, &infos, options)?;
     let point = |(info, quality)| Point::new(info, list.as_ref(), quality);
     let mut points: Vec<Point> = infos.iter().zip(qualities).map(point).collect();
-    let mut error = None;
+    let mut error = first_error(&stream.bytes, options);
     if console.is_json() {
         for (point, info) in points.iter_mut().zip(&infos) {
             error = error.or(point.decode(&stream.bytes, info.point, options));
@@ -78,6 +78,12 @@ pub(super) fn show(stream: &StreamFile, options: &Options, console: &Console) ->
     console
         .report(&points, || text(&points) + &list.map(|list| list.agreement(&infos)).unwrap_or_default())?;
     Ok(error)
+}
+
+/// The first error of the stream, found by decoding all of it.
+fn first_error(bytes: &[u8], options: &Options) -> Option<Error> {
+    let options = Options { operating_point: OperatingPoint::ALL, ..*options };
+    decode_stream(bytes, &options, |_, _| ControlFlow::Continue(())).verdict()
 }
 
 /// What the stream says of its points, if it does.

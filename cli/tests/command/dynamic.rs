@@ -146,6 +146,8 @@ fn decoding_starts_at_the_gop_that_holds_the_first_frame() {
     }
     let said = fail(2, &["decode", text(&dynamic()), "--dry-run", "--frames", "10..12"]);
     assert!(said.contains("no such frames"), "{said}");
+    let said = fail(2, &["decode", text(&dynamic()), "--dry-run", "--frames", "1..2", "--op", "s0,t0,r1"]);
+    assert!(said.contains("none of these frames is at the operating point s0,t0,r1"), "{said}");
 }
 
 #[test]
@@ -299,7 +301,9 @@ fn a_list_of_points_that_is_wrong_is_named() {
         bytes[at + UNIT_HEADER + 4 + 2 * 24 + 4] += 1;
         seal(bytes, at);
     });
-    let said = succeed(&["inspect", text(&path), "--ops"]);
+    let output = run(&["inspect", text(&path), "--ops"]);
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(11));
     assert!(said.contains("other figures than the units (clause 6.16): s0,t0,r2\n"), "{said}");
     let said = fail(11, &["validate", text(&path)]);
     assert!(said.contains("clause 6.16") && said.contains("frame_count"), "{said}");

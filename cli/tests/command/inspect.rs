@@ -177,7 +177,25 @@ fn a_cut_stream_is_shown_up_to_the_cut() {
         assert_eq!(shown["units"][0]["type"], "sequence_parameters");
         assert_eq!(shown["error"]["class"], "truncated");
     }
-    for view in ["--ops", "--stats"] {
+    for view in ["--ops", "--stats", "--tree", "--units"] {
         fail(14, &["inspect", text(&path), view]);
+        fail(14, &["inspect", text(&path), view, "-q"]);
+    }
+}
+
+#[test]
+fn a_damaged_unit_is_an_error_of_every_view() {
+    let directory = directory();
+    let path = directory.path().join("damaged.gss");
+    let mut bytes = fs::read(fixture()).unwrap();
+    let units = json(&["inspect", text(&fixture()), "--units"]);
+    let mut units = units["units"].as_array().unwrap().iter();
+    let last = units.rfind(|unit| unit["type"] == "increment").unwrap();
+    bytes[last["at"].as_u64().unwrap() as usize + UNIT_HEADER + 2] ^= 1;
+    fs::write(&path, bytes).unwrap();
+    for view in ["--ops", "--stats", "--tree", "--units"] {
+        for more in [&[][..], &["-q"], &["--json"]] {
+            fail(10, &[&["inspect", text(&path), view], more].concat());
+        }
     }
 }
