@@ -5,6 +5,7 @@ mod report;
 
 use crate::console::{Console, to_json};
 use crate::failure::Failure;
+use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_ending, refuse_inputs};
 use crate::package::files_in;
 use crate::stream_file::LimitArgs;
@@ -14,8 +15,9 @@ use decoding::Decoding;
 use report::Report;
 use splatstream_stream::client::{Client, Following, Options, PlayedGop};
 use splatstream_stream::control::{
-    Bola, BufferRule, Layered, Limits, Rule, Settings, Single, ThroughputRule,
+    Bola, BufferRule, Gop, Layered, Limits, Rule, Settings, Single, ThroughputRule,
 };
+use splatstream_stream::manifest::Manifest;
 use splatstream_stream::simulation::{Link, Requests, Trace, simulate};
 use std::path::{Path, PathBuf};
 
@@ -42,7 +44,7 @@ pub(crate) struct Play {
     /// Milliseconds from a request to its first byte, on the simulated network.
     #[arg(long, value_name = "MS", default_value_t = 50, requires = "trace", value_parser = clap::value_parser!(u32).range(0..=60_000))]
     latency: u32,
-    /// Gaussians that the device can draw: points whose frames may have more are not played.
+    /// Gaussians that the device can draw: points whose frames may have more are not played, but for the lowest of each GOP.
     #[arg(long, value_name = "N")]
     limit_gaussians: Option<u64>,
     /// Highest spatial and temporal layer to fetch.
@@ -120,6 +122,7 @@ impl Play {
         let trace = self.trace.as_deref().map(|path| self.read_trace(path)).transpose()?;
         let failed = |error| Failure::other(format!("{}: cannot play: {error}", self.location));
         let mut client = Client::open(&self.location, self.options()).map_err(failed)?;
+        self.warn_of_large_points(client.manifest(), console);
         let report = match trace {
             Some(trace) => {
                 let ladder = client.manifest().ladder().map_err(|error| Failure::other(error.to_string()))?;
@@ -147,7 +150,28 @@ impl Play {
         if let Some(path) = &self.out {
             OutputFile::write_apart(path, &inputs, to_json(&report)?.as_bytes())?;
         }
-        console.report_beside(self.out.as_deref(), &report, || report.text())
+        console.report_beside(self.out.as_deref(), &report, || report.text())?;
+        match report.has_played() {
+            true => Ok(()),
+            false => Err(Failure::other(format!(
+                "{}: nothing could be played: no GOP of it arrived\n  check whether all files of the package are there",
+                self.location
+            ))),
+        }
+    }
+
+    /// Says so where even the lowest point of a GOP has more Gaussians than the device can draw: it is played all the same.
+    fn warn_of_large_points(&self, manifest: &Manifest, console: &Console) {
+        let (Some(limit), Ok(ladder)) = (self.limit_gaussians, manifest.ladder()) else { return };
+        let least = |gop: &Gop| gop.points().iter().map(|point| point.gaussians).min();
+        let largest = ladder.gops().iter().filter_map(least).max().unwrap_or_default();
+        if largest > limit {
+            console.complain(&format!(
+                "warning: frames of the lowest operating point have up to {}, more than --limit-gaussians {limit}; \
+                 they are played all the same, since nothing has fewer",
+                counted(largest, "Gaussian")
+            ));
+        }
     }
 
     /// The files that it reads: a trace, and those of a package on this machine.

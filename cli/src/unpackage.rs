@@ -48,6 +48,8 @@ impl Unpackage {
         console.claim(Some(&self.out))?;
         check_stream_name(&self.out)?;
         let paths = self.media()?;
+        let manifest = self.manifest()?;
+        self.check_complete(&paths, manifest.as_ref())?;
         let mut files: Vec<(String, Vec<u8>)> = Vec::new();
         for path in &paths {
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -63,7 +65,7 @@ impl Unpackage {
             let path = self.directory.join(&error.file);
             Failure::stream(if path.exists() { &path } else { &self.directory }, error.error)
         })?;
-        let verified = self.verify(&stream)?;
+        let verified = self.verify(&stream, manifest)?;
         let inputs = [paths.as_slice(), &[self.directory.join(Package::MANIFEST)]].concat();
         OutputFile::write_apart(&self.out, &inputs, &stream)?;
         let bytes = stream.len() as u64;
@@ -93,14 +95,35 @@ impl Unpackage {
         Ok(paths)
     }
 
-    /// Whether there is a manifest; a stream that is not the one it describes is refused.
-    fn verify(&self, stream: &[u8]) -> Result<bool, Failure> {
+    /// The manifest beside the files, if there is one.
+    fn manifest(&self) -> Result<Option<Manifest>, Failure> {
         let path = self.directory.join(Package::MANIFEST);
         if !path.exists() {
-            return Ok(false);
+            return Ok(None);
         }
         let manifest = Manifest::parse(&read_whole(&path, Manifest::MAX_BYTES as u64)?);
-        let manifest = manifest.map_err(|error| Failure::other(format!("{}: {error}", path.display())))?;
+        manifest.map(Some).map_err(|error| Failure::other(format!("{}: {error}", path.display())))
+    }
+
+    /// Whether all files are there that the manifest names; without one, whether there is any.
+    fn check_complete(&self, paths: &[PathBuf], manifest: Option<&Manifest>) -> Result<(), Failure> {
+        if paths.is_empty() {
+            let directory = self.directory.display();
+            return Err(Failure::other(format!("{directory}: no .mp4 or .m4s files here\n  check the path")));
+        }
+        let mut names = manifest.into_iter().flat_map(files_of);
+        match names.find(|name| !self.directory.join(name).is_file()) {
+            None => Ok(()),
+            Some(name) => Err(Failure::other(format!(
+                "{}: the file is missing, and the manifest names it\n  copy the package again",
+                self.directory.join(name).display()
+            ))),
+        }
+    }
+
+    /// Whether there is a manifest; a stream that is not the one it describes is refused.
+    fn verify(&self, stream: &[u8], manifest: Option<Manifest>) -> Result<bool, Failure> {
+        let Some(manifest) = manifest else { return Ok(false) };
         if !manifest.describes(stream) {
             return Err(Failure::other(format!(
                 "{}: the files are not those that the manifest was written for\n  copy the package again",
@@ -109,6 +132,16 @@ impl Unpackage {
         }
         Ok(true)
     }
+}
+
+/// The files with media that a manifest names.
+fn files_of(manifest: &Manifest) -> impl Iterator<Item = &str> {
+    let of_representations = manifest.representations.iter().flat_map(|info| {
+        let tail = info.tail_file.as_deref();
+        [Some(info.file.as_str()), tail].into_iter().flatten()
+    });
+    let subsegments = manifest.gops.iter().flat_map(|gop| &gop.subsegments);
+    of_representations.chain(subsegments.filter_map(|subsegment| subsegment.file.as_deref()))
 }
 
 /// The Representation that a file says it is of, and its number in it: 0 begins it.

@@ -134,6 +134,11 @@ impl Report {
         Self { location: location.to_owned(), rule, ..self }
     }
 
+    /// Whether any GOP was played, if there was one.
+    pub(super) fn has_played(&self) -> bool {
+        self.gops.is_empty() || self.gops.iter().any(|gop| gop.op.is_some())
+    }
+
     pub(super) fn text(&self) -> String {
         let totals = &self.totals;
         let mut text = String::new();

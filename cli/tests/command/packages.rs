@@ -160,5 +160,6 @@ fn damage_is_said() {
     fs::remove_file(out.join("manifest.json")).unwrap();
     assert_eq!(json(&["unpackage", text(&out), "-o", text(&back)])["verified"], false);
     fs::remove_file(out.join("s0.mp4")).unwrap();
-    fail(11, &["unpackage", text(&out), "-o", text(&back)]);
+    let said = fail(1, &["unpackage", text(&out), "-o", text(&back)]);
+    assert!(said.contains("no .mp4 or .m4s files here"), "{said}");
 }

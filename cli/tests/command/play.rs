@@ -1,7 +1,7 @@
 //! `play`: packages are fetched, checked and decoded, and reported on.
 
 use crate::common;
-use crate::common::{directory, fail, json, scene, succeed, text};
+use crate::common::{directory, fail, json, run, scene, succeed, text};
 use serde_json::Value;
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::ply;
@@ -117,4 +117,19 @@ fn the_table_of_qualities_has_every_point_of_every_gop() {
         assert_eq!((&row["psnr_db"], &row["ssim"]), (&50.0.into(), &1.0.into()));
     }
     assert!(table.iter().any(|row| row["psnr_db"].as_f64().unwrap() < 50.0));
+}
+
+#[test]
+fn what_cannot_be_played_at_all_is_an_error() {
+    let directory = directory();
+    let package = package(directory.path(), &[]);
+    let output = run(&["play", text(&package), "--no-wait", "--limit-gaussians", "1"]);
+    assert!(output.status.success());
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(said.contains("more than --limit-gaussians 1; they are played all the same"), "{said}");
+    fs::remove_file(package.join("s0.mp4")).unwrap();
+    let said = fail(1, &["play", text(&package), "--no-wait"]);
+    assert!(said.contains("nothing could be played"), "{said}");
+    let said = fail(1, &["unpackage", text(&package), "-o", text(&directory.path().join("back.gss"))]);
+    assert!(said.contains("s0.mp4: the file is missing"), "{said}");
 }
