@@ -117,7 +117,13 @@ impl Fit {
         let shown = rows.iter().map(|&row| ranked.shown[row as usize]).collect();
         let sample = frame.select(&rows);
         Self {
-            bases: [slices(frame.dc()), slices(frame.sh())],
+            bases: [
+                slices(frame.dc()),
+                match settings.tools.sh_transform {
+                    true => slices(frame.sh()),
+                    false => Components::identity(frame.sh().len()),
+                },
+            ],
             scene,
             settings: Settings { laws, ..settings.clone() },
             refinement,

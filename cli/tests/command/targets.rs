@@ -177,3 +177,18 @@ fn blank_pictures_are_no_quality() {
     let report = json(&[&compare[..], &["ring:1", "--height", "60"]].concat());
     assert_eq!((&report["psnr_db"], &report["blank_pictures"]), (&100.0.into(), &0.into()));
 }
+
+#[test]
+fn a_quality_is_measured_without_a_transform_too() {
+    let directory = directory();
+    let (path, stream) = (directory.path().join("scene.ply"), directory.path().join("scene.gss"));
+    let scene = BuiltinScene { gaussians: 1500, sh_degree: 3, ..BuiltinScene::default() };
+    fs::write(&path, ply::write(&scene.frame(0))).unwrap();
+    let encode = ["encode", text(&path), "-o", text(&stream), "--psnr", "48"];
+    let [with, without] = [&[][..], &["--without", "sh-transform"]].map(|more| {
+        let report = json(&[&encode[..], more].concat());
+        assert!((report["fitted_psnr_db"].as_f64().unwrap() - 48.0).abs() < 0.5, "{report}");
+        report["fitted_psnr_db"].as_f64().unwrap()
+    });
+    assert_ne!(with, without, "what one was fitted with is not what the other has");
+}
