@@ -326,7 +326,7 @@ fn frames_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     let folder = directory.display();
     match kinds.len() {
         0 => Err(Failure::other(format!(
-            "{folder}: no frames here\n  give a directory with .ply, .compressed.ply, .spz, .sog, .splat, .ksplat or .glb files"
+            "{folder}: no frames here\n  give a directory with .ply, .compressed.ply, .spz, .sog, .splat, .ksplat, .glb or .gltf files, or with SOG directories"
         ))),
         1 => Ok(paths),
         _ => {

@@ -13,7 +13,7 @@ pub(crate) enum PresetName {
     Fast,
     /// Two contexts per plane, trials on samples, orders by pictures.
     Balanced,
-    /// As balanced, and values of single frames are fitted to pictures: --finetune 20.
+    /// As balanced, with an order that is weighed again more often, and values of single frames that are fitted to pictures: --finetune 20.
     Small,
 }
 

@@ -178,7 +178,8 @@ pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
             return setting("prune", decibels.to_string(), "20 to 90");
         }
         if settings.structure != Structure::Intra {
-            return setting("prune", decibels.to_string(), "nothing where frames refer to others");
+            let allowed = "pruning of a single frame, or of a sequence without predicted frames (all-intra)";
+            return setting("prune", format!("{decibels} dB in a sequence with predicted frames"), allowed);
         }
     }
     if let Some(finetune) = &settings.finetune {

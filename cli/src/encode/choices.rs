@@ -19,7 +19,7 @@ fn saved(report: &Report, tool: Tool) -> Option<(f64, Basis)> {
 
 /// Every decision in the report.
 pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
-    let mut choices = vec![positions(report, settings), axes(report), degree(report, settings)];
+    let mut choices = vec![positions(report, settings), axes(report, settings), degree(report, settings)];
     choices.extend(steps(report, settings));
     choices.extend(laws(report, settings));
     choices.extend(tables(report));
@@ -50,7 +50,7 @@ pub(super) fn up(guess: UpGuess) -> Choice {
 
 fn positions(report: &Report, settings: &Settings) -> Choice {
     let bits = report.position_bits;
-    let choice = format!("{bits} bits per axis, grid step {}", report.position_step);
+    let choice = format!("{} per axis, grid step {}", counted(bits.into(), "bit"), report.position_step);
     let inner = report.steps.unwrap_or(settings.steps).position_bits;
     let why = format!(
         "the core of the scene spans 2^{inner:.2} cells at this quality; the rest is for what lies outside"
@@ -74,11 +74,18 @@ fn steps(report: &Report, settings: &Settings) -> Option<Choice> {
     ))
 }
 
-fn axes(report: &Report) -> Choice {
+fn axes(report: &Report, settings: &Settings) -> Choice {
     let (sorted, [bits_sorted, bits_unsorted]) = report.canonical_axes;
-    let why = format!(
+    let cost = format!(
         "scale and rotation take {bits_sorted:.2} bits per Gaussian sorted, {bits_unsorted:.2} as they come"
     );
+    let why = match (sorted, settings.tools.axis_sort) {
+        (false, false) => format!("{cost}; --without axis-sort"),
+        (false, true) if bits_sorted < bits_unsorted => {
+            format!("{cost}; frames are sorted only where all stand for themselves, in one layer")
+        }
+        _ => cost,
+    };
     let choice = Choice::new("axes", if sorted { "sorted by size" } else { "as they come" }, why);
     choice.saving(saved(report, Tool::Axes))
 }
@@ -261,7 +268,7 @@ fn survivors(report: &Report) -> Option<Choice> {
         share(sum(|frame| frame.new)),
     );
     let cells = sum(|frame| frame.cells) / frames().count().max(1) as u64;
-    let why = format!("{} cells per frame move the rest where it belongs, or it stays", grouped(cells));
+    let why = format!("the rest is moved by {} per frame where it belongs, or stays", counted(cells, "cell"));
     Some(Choice::new("survivors", choice, why))
 }
 

@@ -148,6 +148,8 @@ fn missed_psnr_advice(report: &Report, settings: &Settings) -> &'static str {
         "pictures are compared with those of all spherical harmonics: give a higher --sh-degree"
     } else if settings.prune.is_some() {
         "what was left out counts: give a higher --prune"
+    } else if settings.psnr.is_some_and(|wanted| wanted >= MOST_PSNR) {
+        "no finer quantisers can be asked for; look for Gaussians that are far larger or brighter than all others"
     } else {
         "give a higher --psnr, or look for Gaussians that are far larger or brighter than all others"
     }
@@ -179,6 +181,9 @@ fn missed_size(report: &Report, size: Size) -> Option<Warning> {
     Some(Warning::new("size-missed", message))
 }
 
+/// The highest PSNR that can be asked for.
+const MOST_PSNR: f32 = 90.0;
+
 /// Predicted frames that are worse than the I frames between them are seen as a pulse.
 fn pulses(report: &Report) -> Option<Warning> {
     let pictures = report.pictures.as_ref()?;
@@ -201,11 +206,19 @@ fn pulses(report: &Report) -> Option<Warning> {
     })
 }
 
+/// Gaussians of a frame below which headers decide whether it is predicted.
+const FEW: u64 = 500;
+
 /// What helps frames that have nothing in common.
 const TRACK: &str = "`splatstream track` makes one sequence of frames that were trained apart";
 
 /// A sequence in which hardly any frame can be predicted.
 fn short_gops(report: &Report, settings: &Settings) -> Option<Warning> {
+    if report.stands_alone && report.gaussians < FEW * u64::from(report.frames) {
+        let message = "no layers, and every frame by itself: headers of more units would take more bytes than predicting \
+                       frames of so few Gaussians saves; --all-intra does the same, and faster";
+        return Some(Warning::new("short-gops", message.to_owned()));
+    }
     let alone = "frames have too little in common with the ones before to be predicted for fewer bytes";
     let asked = (report.frames as usize).div_ceil(settings.gop.max(1) as usize);
     let count = report.gops.len();
