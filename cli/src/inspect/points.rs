@@ -66,18 +66,31 @@ pub(super) fn show(stream: &StreamFile, options: &Options, console: &Console) ->
         Ok(found) => found,
         Err(error) => return Ok(Some(error)),
     };
-    let qualities = qualities(stream, &infos, options)?;
+    let own = distinct(&infos);
+    let qualities = qualities(stream, &own, options)?;
     let point = |(info, quality)| Point::new(info, list.as_ref(), quality);
-    let mut points: Vec<Point> = infos.iter().zip(qualities).map(point).collect();
+    let mut points: Vec<Point> = own.iter().zip(qualities).map(point).collect();
     let mut error = first_error(&stream.bytes, options);
     if console.is_json() {
-        for (point, info) in points.iter_mut().zip(&infos) {
+        for (point, info) in points.iter_mut().zip(&own) {
             error = error.or(point.decode(&stream.bytes, info.point, options));
         }
     }
     console
         .report(&points, || text(&points) + &list.map(|list| list.agreement(&infos)).unwrap_or_default())?;
     Ok(error)
+}
+
+/// The points without those that have no unit more than a lower one, as in what `extract` has written.
+fn distinct(infos: &[OperatingPointInfo]) -> Vec<OperatingPointInfo> {
+    let has = |info: &OperatingPointInfo| (info.bytes, info.frames, info.gaussians);
+    let mut own: Vec<OperatingPointInfo> = Vec::new();
+    for info in infos {
+        if own.iter().all(|lower| has(lower) != has(info)) {
+            own.push(*info);
+        }
+    }
+    own
 }
 
 /// The first error of the stream, found by decoding all of it.

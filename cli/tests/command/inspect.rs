@@ -6,6 +6,7 @@ use splatstream_encoder::{Preset, Quality, Settings, ShChoice, encode};
 use splatstream_files::builtin::BuiltinScene;
 use std::fs;
 use std::io::Write;
+use std::path::Path;
 
 /// The committed stream is what the encoder wrote once; other encoders may write others. For a change of the
 /// bitstream `BLESS=1 cargo test -p splatstream-cli --test command inspect::the_fixture` writes it again.
@@ -150,6 +151,22 @@ fn operating_points_are_the_streams_that_extraction_makes() {
         succeed(&["extract", text(&fixture()), "--op", point["op"].as_str().unwrap(), "-o", text(&part)]);
         assert_eq!(point["bytes"], fs::metadata(&part).unwrap().len() - always);
         assert_eq!(point["gaussians"], json(&["validate", text(&part)])["gaussians"]);
+    }
+}
+
+#[test]
+fn an_extracted_stream_has_no_points_that_were_left_out() {
+    let directory = directory();
+    let part = directory.path().join("part.gss");
+    let points = |path: &Path| -> Vec<String> {
+        let points = json(&["inspect", text(path), "--ops"]);
+        let points = points.as_array().unwrap().iter();
+        points.map(|point| point["op"].as_str().unwrap().to_owned()).collect()
+    };
+    let all = points(&fixture());
+    for (count, point) in (1..).zip(&all) {
+        succeed(&["extract", text(&fixture()), "--op", point, "-o", text(&part)]);
+        assert_eq!(points(&part), all[..count]);
     }
 }
 
