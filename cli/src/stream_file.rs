@@ -96,6 +96,15 @@ impl StreamFile {
         }
     }
 
+    /// The first error in the units: one that is cut off, or whose payload is not the one that was written. Nothing is decoded.
+    pub(crate) fn damage(&self, limits: &Limits) -> Option<Error> {
+        let mut units = match Stream::open(&self.bytes, limits) {
+            Ok(stream) => stream.units(),
+            Err(error) => return Some(error),
+        };
+        units.find_map(|unit| unit.and_then(|unit| unit.check_payload()).err())
+    }
+
     /// The first sequence parameters that are intact.
     pub(crate) fn sequence(&self, limits: &Limits) -> Option<SequenceParameters> {
         let stream = Stream::open(&self.bytes, limits).ok()?;

@@ -70,6 +70,10 @@ impl View {
         let stream = StreamFile::read(&self.input)?;
         let limits = self.limits.limits();
         Stream::open(&stream.bytes, &limits).map_err(|error| stream.fault(error))?;
+        if let Some(error) = stream.damage(&limits) {
+            let path = stream.path.display();
+            console.complain(&format!("warning: {path}: {error}\n  the page plays what is intact"));
+        }
         let described = stream.description(&limits).and_then(|description| description.title);
         let title = self.title.clone().or(described).unwrap_or_else(|| name_of(&self.input));
         match &self.out {

@@ -248,7 +248,7 @@ fn short_time(report: &Report, settings: &Settings) -> Option<Warning> {
     let is_given_up = report.frames == 1 && report.target.is_some_and(|target| target.without_finetune);
     let is_idle = report.finetuned.iter().any(|fitted| fitted.iterations == 0);
     let message = format!(
-        "--finetune came to nothing in the {} seconds of --time-budget, which may have been over before the first iteration: give \
+        "--finetune came to nothing in the {} s of --time-budget, which may have been over before the first iteration: give \
          more, or leave out --time-budget",
         budget.as_secs_f64(),
     );

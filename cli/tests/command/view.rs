@@ -1,7 +1,7 @@
 //! `view`: a stream as a web page.
 
 use crate::common;
-use crate::common::{directory, fail, fixture, json, succeed, text};
+use crate::common::{directory, fail, fixture, json, run, succeed, text};
 use std::fs;
 use std::path::PathBuf;
 
@@ -83,4 +83,20 @@ fn frames_become_a_page_in_one_command() {
     assert_eq!(of_page["bytes"], fs::metadata(&stream).unwrap().len());
     // The page is what `view` makes of the stream.
     assert_eq!(fs::read_to_string(&page).unwrap(), succeed(&["view", text(&stream), "-o", "-"]));
+}
+
+#[test]
+fn a_damaged_stream_is_shown_with_a_warning() {
+    let directory = directory();
+    let (path, page) = (directory.path().join("damaged.gss"), directory.path().join("damaged.html"));
+    let mut bytes = fs::read(fixture()).unwrap();
+    let last = bytes.len() - 200;
+    bytes[last] ^= 1;
+    fs::write(&path, bytes).unwrap();
+    let output = run(&["view", text(&path), "-o", text(&page)]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        output.status.success() && said.starts_with("warning: ") && said.contains("payload_crc"),
+        "{said}"
+    );
 }
