@@ -117,8 +117,8 @@ fn psnr(report: &Report, settings: &Settings, wanted: f64) -> Vec<Warning> {
     }
     if fitted - wanted > MISSED {
         let message = format!(
-            "pictures have a PSNR of {fitted:.1} dB, {:.1} dB more than the {wanted} dB asked for; \
-             the stream is larger than it needs to be",
+            "pictures have a PSNR of {fitted:.1} dB in the views that quantisers were fitted in, {:.1} dB more than the \
+             {wanted} dB asked for; the stream is larger than it needs to be",
             fitted - wanted
         );
         return vec![Warning::new("psnr-exceeded", message)];
