@@ -110,6 +110,12 @@ class Runs(unittest.TestCase):
         self.run.rounds(self.scene, [[case]])
         self.assertEqual(self.run.results[0]["wall_s"], [1.0, 2.0, 3.0])
 
+    def test_what_is_fast_counts_after_some_time(self):
+        seconds = iter([0.0625] * 3 + [0.03125] + [0.25, 0.5])
+        case = Case("a", "decode", "", 1, lambda: {"cpu_s": 1.0, "wall_s": next(seconds), "bytes": 5})
+        self.assertEqual(speed.measured(case)["wall_s"], 0.03125)
+        self.assertEqual(speed.measured(case)["wall_s"], 0.5)
+
     def test_what_is_slow_is_done_once(self):
         self.run.rounds(self.scene, [[self.case("slow", seconds=100), self.case("b")]])
         self.assertEqual(self.order, ["slow"] + ["b"] * 6)
