@@ -100,6 +100,16 @@ pub(crate) fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/small.gss")
 }
 
+/// The same with a damaged payload, in a directory.
+pub(crate) fn write_damaged(directory: &Path) -> PathBuf {
+    let path = directory.join("damaged.gss");
+    let mut bytes = std::fs::read(fixture()).expect("a file");
+    let last = bytes.len() - 200;
+    bytes[last] ^= 1;
+    std::fs::write(&path, bytes).expect("a file");
+    path
+}
+
 /// Bytes of a unit_header.
 pub(crate) const UNIT_HEADER: usize = 20;
 

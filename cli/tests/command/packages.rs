@@ -1,6 +1,6 @@
 //! `package` and `unpackage`: a stream goes to files and comes back.
 
-use crate::common::{directory, fail, fixture, json, run_with, succeed, text, write_stream};
+use crate::common::{directory, fail, fixture, json, run_with, succeed, text, write_damaged, write_stream};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -140,11 +140,7 @@ fn another_packager_is_tested_on_the_streams() {
 fn damage_is_said() {
     let directory = directory();
     let (out, back) = (directory.path().join("out"), directory.path().join("back.gss"));
-    let mut damaged = fs::read(fixture()).unwrap();
-    let last = damaged.len() - 200;
-    damaged[last] ^= 1;
-    let stream = directory.path().join("damaged.gss");
-    fs::write(&stream, damaged).unwrap();
+    let stream = write_damaged(directory.path());
     fail(10, &["package", text(&stream), "-o", text(&out)]);
     assert!(!out.exists(), "nothing is left of it");
     succeed(&["package", text(&fixture()), "-o", text(&out)]);

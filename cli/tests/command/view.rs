@@ -1,7 +1,7 @@
 //! `view`: a stream as a web page.
 
 use crate::common;
-use crate::common::{directory, fail, fixture, json, run, succeed, text};
+use crate::common::{directory, fail, fixture, json, run, succeed, text, write_damaged};
 use std::fs;
 use std::path::PathBuf;
 
@@ -88,11 +88,7 @@ fn frames_become_a_page_in_one_command() {
 #[test]
 fn a_damaged_stream_is_shown_with_a_warning() {
     let directory = directory();
-    let (path, page) = (directory.path().join("damaged.gss"), directory.path().join("damaged.html"));
-    let mut bytes = fs::read(fixture()).unwrap();
-    let last = bytes.len() - 200;
-    bytes[last] ^= 1;
-    fs::write(&path, bytes).unwrap();
+    let (path, page) = (write_damaged(directory.path()), directory.path().join("damaged.html"));
     let output = run(&["view", text(&path), "-o", text(&page)]);
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(
