@@ -32,6 +32,7 @@ use crate::setting_names::{
 };
 use crate::up_guess::UpGuess;
 use clap::Args;
+use core::ops::RangeInclusive;
 use decided::Decided;
 use effort::Budget;
 use encoded::Encoded;
@@ -197,8 +198,11 @@ pub(crate) struct Encode {
 /// Cameras that a stream can hold.
 const MAX_CAMERAS: usize = 64;
 
+/// A PSNR that can be asked for, decibels.
+const PSNR_ALLOWED: RangeInclusive<f32> = 20.0..=90.0;
+
 fn parse_psnr(text: &str) -> Result<f32, String> {
-    let decibels = text.parse().ok().filter(|decibels| (20.0..=90.0).contains(decibels));
+    let decibels = text.parse().ok().filter(|decibels| PSNR_ALLOWED.contains(decibels));
     decibels.ok_or_else(|| format!("'{text}' is not a PSNR from 20 to 90 decibels"))
 }
 

@@ -1,6 +1,7 @@
 //! The option that leaves out what pictures hardly miss.
 
 use super::choice::Choice;
+use super::{PSNR_ALLOWED, parse_psnr};
 use crate::failure::Failure;
 use clap::Args;
 use splatstream_chart::numbers::{grouped, percent};
@@ -38,9 +39,8 @@ fn parse_threshold(text: &str) -> Result<Threshold, String> {
     if text == "auto" {
         return Ok(Threshold::Above(ABOVE));
     }
-    let decibels = text.parse().ok().filter(|decibels| (20.0..=90.0).contains(decibels));
-    let error = format!("'{text}' is not a PSNR from 20 to 90 decibels; without one put --prune last");
-    decibels.map(Threshold::Decibels).ok_or(error)
+    let decibels = parse_psnr(text).map_err(|error| format!("{error}; without one put --prune last"))?;
+    Ok(Threshold::Decibels(decibels))
 }
 
 impl PruneArgs {
@@ -56,7 +56,7 @@ impl PruneArgs {
                 )))
             }
             (Some(Threshold::Decibels(decibels)), _) => Ok(Some(decibels)),
-            (Some(Threshold::Above(above)), Some(psnr)) => Ok(Some((psnr + above).min(90.0))),
+            (Some(Threshold::Above(above)), Some(psnr)) => Ok(Some((psnr + above).min(*PSNR_ALLOWED.end()))),
             (Some(Threshold::Above(_)), None) => {
                 Err(Failure::Usage("--prune needs a PSNR where a size is asked for, as --prune 58".into()))
             }

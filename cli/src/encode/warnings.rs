@@ -1,5 +1,6 @@
 //! What a user should know of a stream that was encoded without an error.
 
+use super::PSNR_ALLOWED;
 use super::pictures::Goal;
 use crate::likeness::Unlike;
 use crate::numbers::counted;
@@ -148,7 +149,7 @@ fn missed_psnr_advice(report: &Report, settings: &Settings) -> &'static str {
         "pictures are compared with those of all spherical harmonics: give a higher --sh-degree"
     } else if settings.prune.is_some() {
         "what was left out counts: give a higher --prune"
-    } else if settings.psnr.is_some_and(|wanted| wanted >= MOST_PSNR) {
+    } else if settings.psnr.is_some_and(|wanted| wanted >= *PSNR_ALLOWED.end()) {
         "no finer quantisers can be asked for; look for Gaussians that are far larger or brighter than all others"
     } else {
         "give a higher --psnr, or look for Gaussians that are far larger or brighter than all others"
@@ -180,9 +181,6 @@ fn missed_size(report: &Report, size: Size) -> Option<Warning> {
     );
     Some(Warning::new("size-missed", message))
 }
-
-/// The highest PSNR that can be asked for.
-const MOST_PSNR: f32 = 90.0;
 
 /// Predicted frames that are worse than the I frames between them are seen as a pulse.
 fn pulses(report: &Report) -> Option<Warning> {
