@@ -136,7 +136,12 @@ impl Report {
 
     /// Whether any GOP was played, if there was one.
     pub(super) fn has_played(&self) -> bool {
-        self.gops.is_empty() || self.gops.iter().any(|gop| gop.op.is_some())
+        self.gops.is_empty() || self.played() > 0
+    }
+
+    /// GOPs that were played.
+    fn played(&self) -> usize {
+        self.gops.iter().filter(|gop| gop.op.is_some()).count()
     }
 
     pub(super) fn text(&self) -> String {
@@ -156,7 +161,7 @@ impl Report {
                 text += &format!("GOP {}: {error}\n", gop.gop);
             }
         }
-        let shown = self.gops.iter().filter(|gop| gop.op.is_some()).count();
+        let shown = self.played();
         let kind = if self.quality_measured { "measured" } else { "estimated" };
         text += &format!(
             "{shown} of {} by the rule {}: start-up {:.3} s, {} of {:.3} s, {}\n\
