@@ -8,10 +8,10 @@ use crate::settings::Settings;
 use std::path::Path;
 
 impl FinetuneState {
-    /// In a directory without one, which is made if it is not there.
+    /// In a directory without one. It is made when the first fit begins, if it is not there.
     ///
     /// # Errors
-    /// A directory that has a state, or cannot be written.
+    /// A directory that has a state, or cannot be read.
     pub fn create(directory: &Path, settings: &Settings) -> Result<Self, StateError> {
         Self::create_for(directory, &named(settings))
     }
@@ -19,7 +19,7 @@ impl FinetuneState {
     /// As an earlier run has left it, or as [`create`](FinetuneState::create) makes it where none has left anything.
     ///
     /// # Errors
-    /// The state of a run with other settings, or of another version of the encoder; a directory that cannot be read or written.
+    /// The state of a run with other settings, or of another version of the encoder; a directory that cannot be read.
     pub fn resume(directory: &Path, settings: &Settings) -> Result<Self, StateError> {
         Self::resume_for(directory, &named(settings))
     }
