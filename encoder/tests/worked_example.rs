@@ -100,7 +100,7 @@ fn annex(bytes: &[u8]) -> String {
         "# Annex D Worked example\n\n\
          Informative. Every byte of a small stream with the element it belongs to, its blocks symbol by symbol, and \
          what comes out. The stream is `data/worked-example.gss`. This annex is written by a test of the reference \
-         encoder, which fails when stream and annex part. Where a table here and clauses 2 to 9 disagree, the \
+         encoder, which fails when stream and annex differ. Where a table here and clauses 2 to 9 disagree, the \
          clauses are right.\n\n",
     );
     scene_table(&mut text);

@@ -22,7 +22,7 @@ table! {
         gop_frame_count: u32,
         /// 0 is all intra, 1 is predicted
         gop_structure: u8,
-        /// dyadic levels of frames between anchors, less than temporal_layer_count
+        /// dyadic levels between frames of temporal layer 0, less than temporal_layer_count
         temporal_depth: u8,
         /// zero
         reserved_zero: u8[2],
@@ -43,7 +43,7 @@ impl GopHeader {
         }
     }
 
-    /// A GOP of an intra frame and predicted ones, with `temporal_depth` layers between anchors.
+    /// A GOP of an intra frame and predicted ones, with `temporal_depth` layers above those of layer 0.
     pub const fn predicted(gop_index: u32, gop_frame_count: u32, temporal_depth: u8) -> Self {
         Self { gop_index, gop_frame_count, gop_structure: PREDICTED, temporal_depth, reserved_zero: [0; 2] }
     }

@@ -62,7 +62,7 @@ table! {
         opacity_weight: u16[3],
         /// how the step of the rotation follows from the anisotropy, 0 to 8191
         anisotropy_weight: u16,
-        /// size from which steps are as announced, -65536 to 65535
+        /// size at which steps are as announced, -65536 to 65535
         size_reference: i32,
         /// opacity from which steps are as announced, -32768 to 32767
         opacity_reference: i32,
@@ -74,9 +74,9 @@ table! {
         ticks_per_second: u32,
         /// ticks from a frame to the next
         ticks_per_frame: u32,
-        /// position of grid point 0, scene units
+        /// position of the expanded coordinates 0, 0, 0, scene units
         position_offset: f32[3],
-        /// distance of grid points, scene units
+        /// distance of grid points in the linear part of the grid, scene units
         position_step: f32,
         /// natural log of the semi-axis at 0
         log_scale_offset: f32,

@@ -27,7 +27,7 @@ pub(crate) fn annex(bytes: &[u8], common: &Common, frames: &[Walked]) -> String 
          refinements: the elements and values of its increments, and the arithmetic of one step of each kind. The \
          stream is `data/worked-temporal-example.gss`; it was put together by hand, and its models and blocks follow \
          the syntax of annex D, with one context and one table per plane. This annex is written by a test from what \
-         the reference decoder computes; the test fails when stream and annex part. Where a table here and clauses 2 \
+         the reference decoder computes; the test fails when stream and annex differ. Where a table here and clauses 2 \
          to 9 disagree, the clauses are right.\n\n",
     );
     overview(&mut text, common, frames);
