@@ -25,8 +25,14 @@ pub(super) async fn answer(
 ) -> Response {
     let transfer = Transfer::begin(shared, connection, &request);
     if let Some(page) = transfer.shared.page.clone().filter(|_| is_for_page(&request)) {
-        let headers = [(CACHE_CONTROL, "no-cache"), (CONTENT_TYPE, "text/html; charset=utf-8")];
-        return respond(transfer, StatusCode::OK, &headers, Content::Text(page));
+        let length = page.len().to_string();
+        let headers = [
+            (CACHE_CONTROL, "no-cache"),
+            (CONTENT_TYPE, "text/html; charset=utf-8"),
+            (CONTENT_LENGTH, length.as_str()),
+        ];
+        let content = if request.method() == Method::HEAD { Content::Empty } else { Content::Text(page) };
+        return respond(transfer, StatusCode::OK, &headers, content);
     }
     let network = &transfer.shared.network;
     if !network.latency.is_zero() {
@@ -48,7 +54,7 @@ pub(super) async fn answer(
 
 /// Whether a request is for the page in place of the folder's own.
 fn is_for_page(request: &Request) -> bool {
-    request.method() == Method::GET && request.uri().path() == "/"
+    [Method::GET, Method::HEAD].contains(request.method()) && request.uri().path() == "/"
 }
 
 /// Looks where waiting for a disk holds up nobody.
