@@ -107,6 +107,25 @@ pub enum Error {
         /// What was announced.
         announced: String,
     },
+    /// Some frames are antialiased and some are not. Frames without Gaussians count as either.
+    #[error(
+        "frame {frame}: antialiasing is {value}, other than in the frames before it, and a stream has one for all frames; give all of them the same"
+    )]
+    Antialiasing {
+        /// The first frame that is not as those before it.
+        frame: u32,
+        /// Whether it is antialiased.
+        value: bool,
+    },
+    /// The first frames that were pushed have no extent, so that nothing says where those of later frames may be.
+    #[error(
+        "the Gaussians of the first {frames} frames are at one point, or there are none, and the stream has to announce where all others \
+         may be; push a GOP that shows the scene first, or encode all frames at once"
+    )]
+    NoExtent {
+        /// Frames of the first GOP, and the one after it.
+        frames: usize,
+    },
     /// There are not so many GOPs.
     #[error(
         "{count} shards are asked for, more than the sequence has GOPs; the most that there can be: {most}; give fewer shards, or shorter GOPs"

@@ -187,10 +187,11 @@ impl Plan {
         }
         let mut source =
             CheckedSource::new(source, &self.settings).expecting(&self.analysis.counts, &self.frame_digests);
-        let encoded = self.encode(&mut source, (frames, Some(shard)), sink, progress);
+        let encoded = self.encode(&mut source, (frames.clone(), Some(shard)), sink, progress);
         let mut report = encoded.map_err(named)?;
         (report.target, report.stands_alone) = (self.target, self.stands_alone);
-        report.leave_out(source.into_dropped());
+        // The first frame of the sequence is read for the views, whichever shard has it.
+        report.leave_out(source.into_dropped().into_iter().filter(|dropped| frames.contains(&dropped.frame)));
         Ok(report)
     }
 

@@ -63,6 +63,11 @@ impl Extent {
         (self.low[0] <= self.high[0]).then_some([self.low, self.high])
     }
 
+    /// Whether two Gaussians are apart.
+    pub(crate) fn has_size(&self) -> bool {
+        self.largest_side() > 0.0
+    }
+
     fn largest_side(&self) -> f64 {
         let side = |axis: usize| f64::from(self.high[axis]) - f64::from(self.low[axis]);
         side(0).max(side(1)).max(side(2)).max(0.0)

@@ -37,8 +37,11 @@ pub(crate) struct Announced {
 /// What holds for all frames, of which some have been seen.
 ///
 /// # Errors
-/// More Gaussians than a stream can carry.
+/// More Gaussians than a stream can carry, and frames whose Gaussians are all at one point.
 pub(crate) fn announce(mut survey: Survey, settings: &Settings) -> Result<(Analysis, Announced), Error> {
+    if !survey.scene.extent.has_size() {
+        return Err(Error::NoExtent { frames: survey.frames() });
+    }
     let scene = &mut survey.scene;
     scene.extent = scene.extent.widened(BOXES);
     let [scale, opacity] = scene.origins;
@@ -58,7 +61,7 @@ pub(crate) fn announce(mut survey: Survey, settings: &Settings) -> Result<(Analy
     survey.degree = survey.source_degree;
     let analysis = Analysis { bounds: None, ..survey.analysis(settings, 0)? };
     let max_gaussians = Limits::of_level(analysis.level).max_gaussians;
-    let (sh_degree, antialiased) = (survey.source_degree, survey.antialiased);
+    let (sh_degree, antialiased) = (survey.source_degree, analysis.parameters.antialiased());
     Ok((analysis, Announced { sh_degree, antialiased, max_gaussians, log_scale, opacity, sh }))
 }
 
@@ -79,8 +82,8 @@ impl Announced {
         if frame.sh_degree() > self.sh_degree {
             return later("SH degree", frame.sh_degree().to_string(), format!("at most {}", self.sh_degree));
         }
-        if frame.antialiased() != self.antialiased {
-            return later("antialiasing", frame.antialiased().to_string(), self.antialiased.to_string());
+        if frame.antialiased() != self.antialiased && !frame.is_empty() {
+            return Err(Error::Antialiasing { frame: number, value: frame.antialiased() });
         }
         let max = self.max_gaussians;
         if frame.len() > max as usize {
@@ -205,6 +208,8 @@ mod tests {
             "frame 3: SH degree is 2, and at most 1 was announced by the first frames; \
             give the first frames as much"
         );
-        assert!(announced.hold(scene().with_antialiased(true), 3).is_err());
+        let error = announced.hold(scene().with_antialiased(true), 3).unwrap_err();
+        assert!(matches!(error, Error::Antialiasing { frame: 3, value: true }));
+        assert!(announced.hold(scene().select(&[]).with_antialiased(true), 3).is_ok());
     }
 }

@@ -61,7 +61,8 @@ pub(crate) struct Survey {
     /// The SH degree that the frames need, and the one that they have.
     pub(crate) degree: u8,
     pub(crate) source_degree: u8,
-    pub(crate) antialiased: bool,
+    /// That of the frames with Gaussians, if there are any.
+    antialiased: Option<bool>,
     axes_trial: [f64; 2],
     /// Gaussians of each frame.
     counts: Vec<u32>,
@@ -82,7 +83,7 @@ impl Survey {
             largest: (0, 0),
             degree: 0,
             source_degree: 0,
-            antialiased: false,
+            antialiased: None,
             axes_trial: [0.0; 2],
             counts: Vec::new(),
         };
@@ -103,11 +104,18 @@ impl Survey {
         self.scene.add(frame, &shown);
         self.source_degree = self.source_degree.max(frame.sh_degree());
         self.degree = self.degree.max(needed_degree(frame, settings.steps.sh));
-        self.antialiased |= frame.antialiased();
+        if !frame.is_empty() && *self.antialiased.get_or_insert(frame.antialiased()) != frame.antialiased() {
+            return Err(Error::Antialiasing { frame: number, value: frame.antialiased() });
+        }
         if number == 0 {
             self.axes_trial = try_axes(frame, &shown, settings);
         }
         Ok(())
+    }
+
+    /// Frames that were looked at.
+    pub(crate) fn frames(&self) -> usize {
+        self.counts.len()
     }
 
     /// What holds for so many frames like these; 0: the number is not known.
@@ -120,7 +128,8 @@ impl Survey {
         // A Gaussian that changes keeps the names of its axes, so that predicted frames are not sorted.
         let sorts = settings.tools.axis_sort && settings.profile() == Profile::Intra;
         let canonical_axes = sorts && sorted <= unsorted;
-        let flags = SequenceParameters::flags(canonical_axes, self.antialiased, settings.whole_anchor());
+        let antialiased = self.antialiased.unwrap_or(false);
+        let flags = SequenceParameters::flags(canonical_axes, antialiased, settings.whole_anchor());
         let parameters = self.scene.parameters(settings, frames, degree, flags);
         let level = level(&parameters, self.largest)?;
         Ok(Analysis {
@@ -181,6 +190,9 @@ pub(crate) fn check(settings: &Settings) -> Result<(), Error> {
             let allowed = "pruning of a single frame, or of a sequence without predicted frames (all-intra)";
             return setting("prune", format!("{decibels} dB in a sequence with predicted frames"), allowed);
         }
+    }
+    if !(settings.tolerance > 0.0 && settings.tolerance.is_finite()) {
+        return setting("tolerance", format!("{} dB", settings.tolerance), "a finite number above 0");
     }
     if let Some(finetune) = &settings.finetune {
         finetune.check(settings)?;

@@ -6,7 +6,7 @@ mod common;
 
 use common::{builtin, decoded, encoded, sequence, strict};
 use splatstream_decoder::output::to_gaussians;
-use splatstream_encoder::{Encoder, Error, Preset, Settings, Structure, encode, plan};
+use splatstream_encoder::{Encoder, Error, Plan, Preset, Settings, Structure, encode, plan};
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::camera::{Up, ring};
 use splatstream_render::{ReferencePictures, metrics};
@@ -78,6 +78,10 @@ fn what_cannot_be_pruned_is_refused() {
     assert!(refused(&predicted, &mut frames));
     assert!(refused(&settings(Some(10.0)), &mut frames));
     assert!(matches!(plan(&mut frames, &settings(Some(50.0))), Err(Error::Setting { name: "prune", .. })));
+    // Nor with the plan of a run without it.
+    let record = plan(&mut frames, &settings(None)).unwrap().record().unwrap();
+    let planned = Plan::from_record(&record, &settings(Some(50.0)));
+    assert!(matches!(planned, Err(Error::Setting { name: "prune", .. })));
     let mut pushed = Encoder::new(Vec::new(), Settings { gop: 1, ..settings(Some(50.0)) });
     let results = [pushed.push(frames[0].clone()), pushed.push(frames[1].clone())];
     assert!(results.iter().any(Result::is_err) || pushed.finish().is_err());

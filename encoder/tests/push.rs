@@ -7,7 +7,7 @@ use common::{decoded, encoded, strict};
 use splatstream_decoder::interrupt::Interrupt;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::stream::Frames;
-use splatstream_encoder::{Encoder, Error, Preset, Report, Settings, Size, Structure};
+use splatstream_encoder::{Encoder, Error, Preset, Report, Settings, Size, Structure, encode};
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_gaussians::GaussianFrame;
 use std::sync::{Arc, Mutex};
@@ -185,4 +185,30 @@ fn a_cancellation_ends_encoding_before_the_next_frame() {
     cancel.request();
     assert!(matches!(encoder.push(frames.next().unwrap()), Err(Error::Cancelled)));
     assert!(matches!(encoder.finish(), Err(Error::Cancelled)));
+}
+
+/// Nothing says where later Gaussians may be.
+#[test]
+fn a_first_gop_without_extent_is_refused() {
+    let frames = frames(3);
+    for first in [frames[0].select(&[]), frames[0].select(&[5])] {
+        let settings = Settings { gop: 1, ..settings() };
+        let mut encoder = Encoder::new(Vec::new(), settings);
+        // What the first GOP and one frame more have is announced.
+        let pushed = [first.clone(), first, frames[2].clone()].map(|frame| encoder.push(frame));
+        let refused = pushed.into_iter().find_map(Result::err);
+        let error = refused.or_else(|| encoder.finish().err()).unwrap();
+        assert!(matches!(error, Error::NoExtent { frames: 2 }), "{error}");
+    }
+}
+
+#[test]
+fn frames_of_which_some_are_antialiased_are_refused() {
+    let mut mixed = frames(3);
+    mixed[2] = mixed[2].clone().with_antialiased(true);
+    let error = encode(&mut mixed, &settings(), &mut Vec::new(), &mut |_, _| {}).unwrap_err();
+    assert!(matches!(error, Error::Antialiasing { frame: 2, value: true }), "{error}");
+    // A frame without Gaussians is as the others are.
+    mixed[2] = mixed[2].select(&[]);
+    encode(&mut mixed, &settings(), &mut Vec::new(), &mut |_, _| {}).unwrap();
 }

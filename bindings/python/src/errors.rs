@@ -114,7 +114,8 @@ pub(crate) fn encode_error(py: Python<'_>, error: EncodeError) -> PyErr {
         EncodeError::TooManyGaussians { .. } | EncodeError::TooManyPerSecond { .. } => "too-many-gaussians",
         EncodeError::Invalid { .. } => "invalid-value",
         EncodeError::OutOfGrid { .. } => "out-of-grid",
-        EncodeError::NotAnnounced { .. } => "not-announced",
+        EncodeError::NotAnnounced { .. } | EncodeError::NoExtent { .. } => "not-announced",
+        EncodeError::Antialiasing { .. } => "antialiasing",
         EncodeError::Cancelled => "cancelled",
         _ => "defect",
     };
@@ -134,6 +135,7 @@ fn place(error: &EncodeError) -> (Option<u32>, Option<usize>, Option<String>) {
     match error {
         EncodeError::TooManyGaussians { frame, .. }
         | EncodeError::TooManyPerSecond { frame, .. }
+        | EncodeError::Antialiasing { frame, .. }
         | EncodeError::Source { frame, .. } => (Some(*frame), None, None),
         EncodeError::Invalid { frame, first, .. } => {
             (Some(*frame), Some(first.row), Some(first.property.clone()))

@@ -1,7 +1,7 @@
 //! A state and the settings that it belongs to. These hold what is asked for of fitting, and that holds the state: here both are
 //! known.
 
-use super::state::{FinetuneState, Named};
+use super::state::FinetuneState;
 use super::state_error::StateError;
 use crate::plan::described;
 use crate::settings::Settings;
@@ -13,7 +13,7 @@ impl FinetuneState {
     /// # Errors
     /// A directory that has a state, or cannot be read.
     pub fn create(directory: &Path, settings: &Settings) -> Result<Self, StateError> {
-        Self::create_for(directory, &named(settings))
+        Self::create_for(directory, &described(settings))
     }
 
     /// As an earlier run has left it, or as [`create`](FinetuneState::create) makes it where none has left anything.
@@ -21,13 +21,6 @@ impl FinetuneState {
     /// # Errors
     /// The state of a run with other settings, or of another version of the encoder; a directory that cannot be read.
     pub fn resume(directory: &Path, settings: &Settings) -> Result<Self, StateError> {
-        Self::resume_for(directory, &named(settings))
+        Self::resume_for(directory, &described(settings))
     }
-}
-
-/// Each setting that values follow from, by its name, in a line.
-fn named(settings: &Settings) -> Vec<Named> {
-    let mut named = described(settings);
-    named.push(("prune", format!("{:?}", settings.prune)));
-    named
 }

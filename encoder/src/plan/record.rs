@@ -3,6 +3,7 @@
 use super::Plan;
 use crate::error::Error;
 use crate::laws::Laws;
+use crate::prune::refuse_pruning;
 use crate::report::TargetReport;
 use crate::sequence::{Analysis, check};
 use crate::settings::{NetworkSource, Settings, ShChoice};
@@ -161,6 +162,7 @@ impl Plan {
     /// Other settings, another version of the encoder, a record that is none of a plan.
     pub fn from_record(record: &PlanRecord, settings: &Settings) -> Result<Self, Error> {
         check(settings)?;
+        refuse_pruning(settings)?;
         same_settings(record, settings)?;
         let [area, opacity, anisotropy, area_reference, anisotropy_reference] = record.laws.map(|law| law.0);
         let coarser = record.coarser;
@@ -242,14 +244,40 @@ fn named(settings: &Settings) -> BTreeMap<String, String> {
 
 /// Everything that the bytes of a stream follow from, beside its frames.
 pub(crate) fn described(settings: &Settings) -> Vec<(&'static str, String)> {
-    let Settings { preset, steps, laws, psnr, size, verify, drop_invalid, gop, structure, anchor, .. } =
-        settings;
-    let Settings { spatial_layers, predictors, predictor_choice, neighbours, network, refinements, .. } =
-        settings;
-    let Settings { sh_degree, sh, keep_invisible, importance, cameras, fidelity, tolerance, tools, .. } =
-        settings;
-    // How much is coded at once changes nothing.
-    let Settings { block_log2, ticks, description, finetune, gop_memory: _, max_memory: _, .. } = settings;
+    let Settings {
+        preset,
+        steps,
+        laws,
+        psnr,
+        size,
+        verify,
+        drop_invalid,
+        gop,
+        structure,
+        anchor,
+        spatial_layers,
+        predictors,
+        predictor_choice,
+        neighbours,
+        network,
+        refinements,
+        sh_degree,
+        sh,
+        keep_invisible,
+        prune,
+        importance,
+        cameras,
+        fidelity,
+        tolerance,
+        finetune,
+        tools,
+        block_log2,
+        ticks,
+        description,
+        // How much is coded at once changes nothing.
+        gop_memory: _,
+        max_memory: _,
+    } = settings;
     let network = match network {
         Some(NetworkSource::Given(_)) => "given".to_owned(),
         other => format!("{other:?}"),
@@ -284,6 +312,7 @@ pub(crate) fn described(settings: &Settings) -> Vec<(&'static str, String)> {
         ("sh_degree", format!("{sh_degree:?}")),
         ("sh", format!("{sh:?}")),
         ("keep_invisible", keep_invisible.to_string()),
+        ("prune", format!("{prune:?}")),
         ("importance", format!("{importance:?}")),
         ("cameras", cameras),
         ("fidelity", format!("{fidelity:?}")),
