@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::numbers::{counted, frames};
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::progress::Progress;
-use crate::stream_file::{LimitArgs, fault};
+use crate::stream_file::{SizeArgs, fault};
 use clap::Args;
 use serde::Serialize;
 use splatstream_encoder::{ConcatError, PartError, StreamPart, concat};
@@ -30,7 +30,7 @@ pub(crate) struct Concat {
     #[arg(short, long = "out", value_name = "OUT.gss")]
     out: PathBuf,
     #[command(flatten)]
-    limits: LimitArgs,
+    limits: SizeArgs,
 }
 
 /// What `--json` prints.

@@ -100,7 +100,7 @@ impl Decode {
         let options = self.options();
         stream.check_point(options.operating_point, &options.limits)?;
         let frames = self.frames.unwrap_or(FrameRange::ALL);
-        let announced = stream.sequence(&options.limits).map_or(0, |sequence| sequence.frame_count);
+        let announced = stream.frame_count(&options.limits);
         if announced > 0 && frames.count_in(announced) == 0 {
             let path = stream.path.display();
             return Err(Failure::Usage(format!("{path}: no such frames, the stream has {announced}")));

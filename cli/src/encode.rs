@@ -208,7 +208,7 @@ fn parse_psnr(text: &str) -> Result<f32, String> {
 
 fn parse_positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok().filter(|number| (1e-6..=1e9).contains(number));
-    number.ok_or_else(|| format!("'{text}' is not a number above 0"))
+    number.ok_or_else(|| format!("'{text}' is not a number from 0.000001 to 1000000000"))
 }
 
 fn parse_tolerance(text: &str) -> Result<f32, String> {
@@ -225,7 +225,7 @@ fn parse_title(text: &str) -> Result<String, String> {
 
 fn parse_metres(text: &str) -> Result<f32, String> {
     let metres = text.parse().ok().filter(|metres| (f32::MIN_POSITIVE..=1e12).contains(metres));
-    metres.ok_or_else(|| format!("'{text}' is not a number of metres above 0"))
+    metres.ok_or_else(|| format!("'{text}' is not a number of metres above 0, at most 10^12"))
 }
 
 impl Encode {

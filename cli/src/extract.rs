@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::numbers::frames;
 use crate::output_file::{OutputFile, check_stream_name, refuse_inputs};
 use crate::short_frames::{layers_of, short_frames};
-use crate::stream_file::{LimitArgs, StreamFile};
+use crate::stream_file::{SizeArgs, StreamFile};
 use clap::Args;
 use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
@@ -30,7 +30,7 @@ pub(crate) struct Extract {
     #[arg(short, long = "out", value_name = "OUT.gss")]
     out: PathBuf,
     #[command(flatten)]
-    limits: LimitArgs,
+    limits: SizeArgs,
 }
 
 /// What `--json` prints.
@@ -79,7 +79,7 @@ fn is_damaged(frame: &Frame) -> bool {
 impl Report {
     fn new(command: &Extract, stream: &StreamFile, extracted: &[u8], limits: &Limits) -> Self {
         let (whole, part) = (Structure::of(&stream.bytes, limits), Structure::of(extracted, limits));
-        let announced = whole.sequence.map(|sequence| sequence.frame_count).filter(|&count| count > 0);
+        let announced = Some(stream.frame_count(limits)).filter(|&count| count > 0);
         let there = frames_of(&whole).map(|frame| frame.index).collect();
         let lost = whole.missing(&there, announced, layers_of(OperatingPoint::ALL));
         let damaged: Vec<u32> =

@@ -213,7 +213,8 @@ pub(crate) fn spool(input: &mut dyn Read, most: u64) -> Result<Unfinished, Failu
         return Err(is_encoded(STANDARD_INPUT));
     }
     detect(unfinished.path()).map_err(|error| Failure::other(named(&error, unfinished.path(), true)))?;
-    count += io::copy(&mut input.take((most + 1).saturating_sub(count)), &mut file).map_err(failed)?;
+    count +=
+        io::copy(&mut input.take(most.saturating_add(1).saturating_sub(count)), &mut file).map_err(failed)?;
     if count > most {
         return Err(Failure::other(format!(
             "{STANDARD_INPUT}: it has more than {most} bytes, which a scene may take to read\n  if you trust it, give a \

@@ -85,7 +85,7 @@ impl Opened {
                 let operating_point = point.unwrap_or(OperatingPoint::ALL);
                 let options = Options { operating_point, ..*options };
                 file.check_point(operating_point, &options.limits)?;
-                let expected = file.sequence(&options.limits).map_or(0, |sequence| sequence.frame_count);
+                let expected = file.frame_count(&options.limits);
                 let frames =
                     stream::Frames::open(&file.bytes, &options).map_err(|error| file.fault(error))?;
                 Ok(Frames::Stream(Box::new(Decoding { file, frames, expected })))

@@ -133,7 +133,7 @@ impl Render {
             if span.contains(number) {
                 let antialiased = frame.antialiased() || self.antialiased;
                 let frame = frame.with_antialiased(antialiased);
-                self.draw(&frame, (number, expected > 1), drawing, &mut drawn)?;
+                self.draw(&frame, (number, expected != 1), drawing, &mut drawn)?;
                 progress.at(drawn.frames);
             }
             next = number.saturating_add(1);
@@ -236,8 +236,14 @@ fn named(cameras: Vec<Camera>) -> Vec<Camera> {
     let mut taken = std::collections::BTreeSet::new();
     let name = |(at, camera): (usize, Camera)| {
         let stem = Path::new(&camera.name).file_stem().and_then(|stem| stem.to_str()).map(str::to_owned);
-        let name = stem.filter(|stem| !taken.contains(stem)).unwrap_or_else(|| format!("camera_{at:04}"));
-        taken.insert(name.clone());
+        let numbered = |number: usize| format!("camera_{number:04}");
+        let mut name = stem.unwrap_or_else(|| numbered(at));
+        for number in at.. {
+            if taken.insert(name.clone()) {
+                break;
+            }
+            name = numbered(number);
+        }
         Camera { name, ..camera }
     };
     cameras.into_iter().enumerate().map(name).collect()

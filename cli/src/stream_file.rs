@@ -12,18 +12,26 @@ use splatstream_format::syntax::{FileHeader, SIGNATURE, SequenceParameters, Unit
 use splatstream_format::unit::{Landmark, Stream};
 use splatstream_format::unit_reader::{Event, UnitReader};
 use splatstream_format::{Error, ErrorKind, Limits};
+use splatstream_stream::structure::{Gop, Structure};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-/// How much a stream may ask of this machine.
+/// How large a stream may be.
 #[derive(Args)]
-pub(crate) struct LimitArgs {
+pub(crate) struct SizeArgs {
     /// Gaussians that a frame may have; a stream that asks for more is refused (exit code 13). Above the default,
     /// the other limits are those of level 4. No stream may have more than its own level allows.
     #[arg(long, value_name = "N", default_value_t = Limits::default().max_gaussians)]
     #[arg(value_parser = clap::value_parser!(u32).range(1..))]
     max_gaussians: u32,
+}
+
+/// How much a stream may ask of this machine where it is decoded.
+#[derive(Args)]
+pub(crate) struct LimitArgs {
+    #[command(flatten)]
+    size: SizeArgs,
 
     /// Most memory that decoding may take, as in 512M or 4G; a stream that asks for more is refused (exit code 13)
     /// [default: three quarters of what this machine has free, and a quarter of that where frames are drawn or
@@ -32,7 +40,7 @@ pub(crate) struct LimitArgs {
     max_memory: Option<u64>,
 }
 
-impl LimitArgs {
+impl SizeArgs {
     /// The limits asked for.
     pub(crate) fn limits(&self) -> Limits {
         let default = Limits::default();
@@ -42,6 +50,13 @@ impl LimitArgs {
             false => default,
         };
         Limits { max_gaussians: self.max_gaussians, ..others }
+    }
+}
+
+impl LimitArgs {
+    /// The limits asked for.
+    pub(crate) fn limits(&self) -> Limits {
+        self.size.limits()
     }
 
     /// Bytes of memory that are asked for, or that there are.
@@ -111,6 +126,17 @@ impl StreamFile {
         let at = Landmark::SequenceParameters.find(&self.bytes, FileHeader::SIZE)?;
         let (unit, profile) = (stream.units_from(at as u64).next()?.ok()?, stream.header().profile());
         SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile).ok()
+    }
+
+    /// How many frames there are: as many as the stream announces or, where it announces none, as its GOPs have if its end unit
+    /// shows that all of them came. 0 if nothing tells.
+    pub(crate) fn frame_count(&self, limits: &Limits) -> u32 {
+        let announced = self.sequence(limits).map_or(0, |sequence| sequence.frame_count);
+        if announced > 0 {
+            return announced;
+        }
+        let structure = Structure::of(&self.bytes, limits);
+        structure.gops.last().filter(|_| structure.has_all_units()).map_or(0, Gop::end)
     }
 
     /// What the stream says about its scene.

@@ -4,7 +4,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_stream_name};
-use crate::stream_file::LimitArgs;
+use crate::stream_file::SizeArgs;
 use crate::whole_file::read_whole;
 use clap::Args;
 use serde::Serialize;
@@ -26,7 +26,7 @@ pub(crate) struct Unpackage {
     #[arg(short, long = "out", value_name = "OUT.gss")]
     out: PathBuf,
     #[command(flatten)]
-    limits: LimitArgs,
+    limits: SizeArgs,
 }
 
 /// The most that is read of a package, bytes: its stream is put together in memory.

@@ -44,7 +44,7 @@ impl Validate {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         let stream = StreamFile::read(&self.input)?;
         let options = self.limits.options();
-        let frames = stream.sequence(&options.limits).map_or(0, |sequence| sequence.frame_count);
+        let frames = stream.frame_count(&options.limits);
         let progress = Progress::frames("checking", frames);
         let mut gaussians = 0;
         let summary = decode_stream(&stream.bytes, &options, |_, frame| {

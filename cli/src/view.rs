@@ -4,7 +4,7 @@ use crate::console::Console;
 use crate::failure::Failure;
 use crate::output_file::{OutputFile, check_ending, refuse_inputs};
 use crate::serve::until_interrupted;
-use crate::stream_file::{LimitArgs, StreamFile};
+use crate::stream_file::{SizeArgs, StreamFile};
 use clap::Args;
 use serde::Serialize;
 use splatstream_chart::numbers::grouped;
@@ -40,7 +40,7 @@ pub(crate) struct View {
     #[arg(long, value_name = "N", default_value_t = 0)]
     port: u16,
     #[command(flatten)]
-    limits: LimitArgs,
+    limits: SizeArgs,
 }
 
 /// The name of the stream beside a page that is served.

@@ -22,8 +22,16 @@ pub(crate) struct Target {
 /// A directory, or a file of one frame.
 enum Place {
     Directory(OutputDirectory),
-    /// With what it may not replace.
-    File(PathBuf, Vec<PathBuf>),
+    File(SingleFile),
+}
+
+/// A file of one frame, which is written when it is known that there is no second one.
+struct SingleFile {
+    path: PathBuf,
+    /// What it may not replace.
+    inputs: Vec<PathBuf>,
+    /// The frame.
+    bytes: Option<Vec<u8>>,
 }
 
 /// What a user says about the files.
@@ -45,18 +53,16 @@ impl Target {
     /// The file or directory that a user named.
     pub(crate) fn new(wanted: Wanted<'_>) -> Result<Self, Failure> {
         let Wanted { path, format, frames, .. } = wanted;
-        let name = path.display();
         let is_directory = !is_standard(path) && is_directory(path)?;
         let named = Format::of_name(path).filter(|_| !is_directory);
         if !is_directory && frames > 1 {
-            return Err(Failure::Usage(format!(
-                "{name}: {frames} frames do not fit in one file; give a directory, or choose one with --frames 0..1"
-            )));
+            return Err(too_many(path, &format!("{frames} frames")));
         }
         if let (Some(format), Some(named)) = (format, named)
             && format != named
         {
             let asked = format.extension();
+            let name = path.display();
             return Err(Failure::Usage(format!("{name}: --format {asked} contradicts the name of the file")));
         }
         if is_standard(path) {
@@ -66,7 +72,7 @@ impl Target {
         Ok(Self {
             place: match is_directory {
                 true => Place::Directory(frame_directory(path, &inputs, wanted.force)?),
-                false => Place::File(path.to_path_buf(), inputs),
+                false => Place::File(SingleFile { path: path.to_path_buf(), inputs, bytes: None }),
             },
             format: format.or(named).unwrap_or(Format::Ply),
             losses: Losses::default(),
@@ -74,18 +80,24 @@ impl Target {
     }
 
     /// Writes one frame.
+    ///
+    /// # Errors
+    /// A file that cannot be written, and a second frame where there is one file.
     pub(crate) fn write(&mut self, number: u32, frame: &GaussianFrame) -> Result<(), Failure> {
         let name = format!("{}.{}", frame_name(number), self.format.extension());
         let bytes = self.format.bytes(frame).map_err(|error| {
             let path = match &self.place {
                 Place::Directory(directory) => directory.path_of(&name),
-                Place::File(path, _) => path.clone(),
+                Place::File(file) => file.path.clone(),
             };
             Failure::other(format!("{}: {error}", path.display()))
         })?;
         match &mut self.place {
             Place::Directory(directory) => directory.write(name, &bytes)?,
-            Place::File(path, inputs) => OutputFile::write_apart(path, inputs, &bytes)?,
+            Place::File(file) if file.bytes.is_some() => {
+                return Err(too_many(&file.path, "the frames of this stream"));
+            }
+            Place::File(file) => file.bytes = Some(bytes),
         }
         self.losses.add(number, frame, self.format);
         Ok(())
@@ -100,7 +112,9 @@ impl Target {
     pub(crate) fn finish(self) -> Result<(), Failure> {
         match self.place {
             Place::Directory(directory) => directory.finish(),
-            Place::File(..) => Ok(()),
+            Place::File(SingleFile { path, inputs, bytes }) => {
+                bytes.map_or(Ok(()), |bytes| OutputFile::write_apart(&path, &inputs, &bytes))
+            }
         }
     }
 
@@ -108,6 +122,14 @@ impl Target {
     pub(crate) fn warnings(&self) -> Vec<Warning> {
         self.losses.warnings(self.format)
     }
+}
+
+/// The failure of frames that are to go into one file.
+fn too_many(path: &Path, frames: &str) -> Failure {
+    let path = path.display();
+    Failure::Usage(format!(
+        "{path}: {frames} do not fit in one file; give a directory, or choose one with --frames 0..1"
+    ))
 }
 
 /// Whether a name is that of a directory, there or not; one that is neither that nor a file that can be written is

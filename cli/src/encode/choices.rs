@@ -95,10 +95,10 @@ fn degree(report: &Report, settings: &Settings) -> Choice {
     let why = match settings.sh_degree {
         Some(asked) => format!("--sh-degree {asked}, the source has {source}"),
         None if stream < source => {
-            format!("the source has {source}; no coefficient above {stream} reaches half a step")
+            format!("the source has {source}; no coefficient above {stream} reaches a quarter of a step")
         }
         None if source == 0 => "the source has no spherical harmonics".to_owned(),
-        None => format!("the source has {source}, and every band rises above half a step"),
+        None => format!("the source has {source}, and its highest band rises above a quarter of a step"),
     };
     Choice::new("sh degree", stream.to_string(), why)
 }
@@ -202,7 +202,7 @@ fn layers(report: &Report, settings: &Settings) -> Option<Choice> {
     }
     let (spatial, structure) = match report.stands_alone {
         true => (1, Structure::Intra),
-        false => (settings.spatial_layers, settings.structure),
+        false => (settings.spatial_layer_count(), settings.structure),
     };
     let temporal = match structure {
         Structure::Intra => "every frame by itself".to_owned(),

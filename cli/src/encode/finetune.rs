@@ -114,13 +114,14 @@ fn point_weight(text: &str) -> Result<PointWeight, String> {
     let (point, weight) = text.split_once('=').unwrap_or((text, "1"));
     let point = point.parse::<OperatingPoint>().map_err(|error| error.to_string())?;
     let weight = weight.parse().ok().filter(|weight| (1e-6..=1e6).contains(weight));
-    let weight = weight.ok_or_else(|| format!("'{text}' has no weight above 0; write it as s0,t0,r1=2"))?;
+    let weight = weight
+        .ok_or_else(|| format!("'{text}' has no weight from 0.000001 to 1000000; write it as s0,t0,r1=2"))?;
     Ok(PointWeight { point, weight })
 }
 
 fn parse_seconds(text: &str) -> Result<f64, String> {
     let seconds = text.parse().ok().filter(|seconds| (0.001..=1e7).contains(seconds));
-    seconds.ok_or_else(|| format!("'{text}' is not a number of seconds above 0"))
+    seconds.ok_or_else(|| format!("'{text}' is not a number of seconds from 0.001 to 10000000"))
 }
 
 /// An attribute of Gaussians.

@@ -46,22 +46,32 @@ fn parse_threshold(text: &str) -> Result<Threshold, String> {
 impl PruneArgs {
     /// The threshold for a stream whose pictures shall have a PSNR.
     pub(super) fn threshold(&self, psnr: Option<f32>) -> Result<Option<f32>, Failure> {
-        match (self.prune, psnr) {
-            (None, _) => Ok(None),
-            (Some(Threshold::Decibels(decibels)), Some(psnr)) if decibels < psnr + LEAST_ABOVE => {
-                Err(Failure::Usage(format!(
-                    "--prune {decibels} leaves no room for a quality of {psnr} dB, which counts what is left out as well: give \
-                     --prune {} or more, or a lower --psnr",
-                    psnr + LEAST_ABOVE
-                )))
-            }
-            (Some(Threshold::Decibels(decibels)), _) => Ok(Some(decibels)),
-            (Some(Threshold::Above(above)), Some(psnr)) => Ok(Some((psnr + above).min(*PSNR_ALLOWED.end()))),
+        let decibels = match (self.prune, psnr) {
+            (None, _) => return Ok(None),
+            (Some(Threshold::Decibels(decibels)), _) => decibels,
+            (Some(Threshold::Above(above)), Some(psnr)) => (psnr + above).min(*PSNR_ALLOWED.end()),
             (Some(Threshold::Above(_)), None) => {
-                Err(Failure::Usage("--prune needs a PSNR where a size is asked for, as --prune 58".into()))
+                return Err(Failure::Usage(
+                    "--prune needs a PSNR where a size is asked for, as --prune 58".into(),
+                ));
             }
+        };
+        match psnr {
+            Some(psnr) if decibels < psnr + LEAST_ABOVE => Err(too_near(decibels, psnr)),
+            _ => Ok(Some(decibels)),
         }
     }
+}
+
+/// The failure of a threshold that leaves no room for the quality of the stream.
+fn too_near(decibels: f32, psnr: f32) -> Failure {
+    let least = psnr + LEAST_ABOVE;
+    let higher =
+        if PSNR_ALLOWED.contains(&least) { format!("--prune {least} or more, or ") } else { String::new() };
+    Failure::Usage(format!(
+        "--prune {decibels} leaves no room for a quality of {psnr} dB, which counts what is left out as well: give \
+         {higher}a lower --psnr"
+    ))
 }
 
 /// What was left out, what that costs, and what it saves.
@@ -102,7 +112,12 @@ mod tests {
         let args = |text| PruneArgs { prune: Some(parse_threshold(text).unwrap()) };
         assert_eq!(args("auto").threshold(Some(50.0)).unwrap(), Some(58.0));
         assert_eq!(args("60").threshold(None).unwrap(), Some(60.0));
+        assert_eq!(args("auto").threshold(Some(87.0)).unwrap(), Some(90.0));
         assert!(args("auto").threshold(None).is_err());
+        for (text, advice) in [("auto", "give a lower --psnr"), ("90", "give a lower --psnr")] {
+            let refused = args(text).threshold(Some(88.0)).unwrap_err().to_string();
+            assert!(refused.contains(advice), "{refused}");
+        }
         assert!(parse_threshold("garden.ply").is_err() && parse_threshold("95").is_err());
     }
 }

@@ -55,10 +55,21 @@ impl Staging {
             let back = moved.iter().rev().filter(|(from, to)| fs::rename(to, from).is_ok());
             if back.count() < moved.len() {
                 state.stagings.retain(|other| *other != self.path);
+                drop(state);
+                return result.map_err(|error| self.stranded(&error));
             }
         }
         drop(state);
         result
+    }
+
+    /// The error of files that could not go back either.
+    fn stranded(&self, error: &io::Error) -> io::Error {
+        let earlier = self.path.join(EARLIER);
+        io::Error::new(
+            error.kind(),
+            format!("{error}; files of the earlier run that could not go back are in {}", earlier.display()),
+        )
     }
 
     /// First earlier files out of the way, then new ones to their places.

@@ -34,4 +34,5 @@ mod serve;
 mod shards;
 mod targets;
 mod track;
+mod unknown_length;
 mod view;
