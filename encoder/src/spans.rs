@@ -150,6 +150,7 @@ impl Coding<'_, '_> {
                     report
                 }
             };
+            self.writer.pass_on()?;
             self.report.append(report);
         }
         Ok(true)
@@ -184,6 +185,7 @@ impl Coding<'_, '_> {
                 }
                 self.begin()?;
                 coded.write_to(self.writer)?;
+                self.writer.pass_on()?;
                 self.report.append(report);
             }
         })

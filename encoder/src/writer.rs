@@ -139,6 +139,12 @@ impl<'a> UnitWriter<'a> {
         shard.map_or(Ok(()), |shard| self.unit(UnitId::stream(Shard::UNIT_TYPE), &shard.to_bytes()))
     }
 
+    /// Passes on what was written: who reads a stream while it is made has each GOP when it is coded.
+    pub(crate) fn pass_on(&mut self) -> Result<(), Error> {
+        self.sink.flush()?;
+        Ok(())
+    }
+
     /// What stands after the last GOP.
     pub(crate) fn finish(mut self) -> Result<(), Error> {
         if let Some(verifier) = &mut self.record.verifier {

@@ -212,3 +212,32 @@ fn frames_of_which_some_are_antialiased_are_refused() {
     mixed[2] = mixed[2].select(&[]);
     encode(&mut mixed, &settings(), &mut Vec::new(), &mut |_, _| {}).unwrap();
 }
+
+/// A pipe: what was flushed can be read, and how much each time.
+#[derive(Default)]
+struct Pipe {
+    bytes: usize,
+    flushed: Vec<usize>,
+}
+
+impl std::io::Write for Pipe {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.bytes += bytes.len();
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.flushed.push(self.bytes);
+        Ok(())
+    }
+}
+
+/// Packages are made of a stream while it is encoded.
+#[test]
+fn each_gop_is_passed_on_when_it_is_coded() {
+    let mut pipe = Pipe::default();
+    let report = encode(&mut frames(12), &settings(), &mut pipe, &mut |_, _| {}).unwrap();
+    assert_eq!(report.gops.len(), 3);
+    let increasing = pipe.flushed.windows(2).all(|pair| pair[0] < pair[1]);
+    assert!(pipe.flushed.len() >= 3 && increasing, "{:?}", pipe.flushed);
+}
