@@ -2,7 +2,6 @@
 
 use crate::capture_files::files_at;
 use crate::failure::Failure;
-use crate::up_guess::UpGuess;
 use clap::{Args, ValueEnum};
 use splatstream_encoder::up_of;
 use splatstream_format::payload::{SceneDescription, UpAxis};
@@ -24,8 +23,8 @@ pub(crate) struct CameraArgs {
     /// Rows of the pictures, 540, 720 and 1080 as a rule; default is what the camera file says, or 540.
     #[arg(long, value_name = "ROWS", value_parser = clap::value_parser!(u32).range(1..=8640))]
     pub(crate) height: Option<u32>,
-    /// What points up in the scene, for cameras that are made for it; default is what the stream says, or y or -y,
-    /// guessed by which end of the first frame is heavier. The report says what was guessed.
+    /// What points up in the scene, for cameras that are made for it; default is what the stream says, or -y, as trainers
+    /// write it.
     #[arg(long, value_enum, allow_hyphen_values = true)]
     pub(crate) up: Option<UpName>,
 }
@@ -155,7 +154,7 @@ impl CameraArgs {
         description: &SceneDescription,
     ) -> Result<Vec<Camera>, Failure> {
         let height = self.height.unwrap_or(HEIGHT);
-        let up = self.up(frame, description);
+        let up = self.up(description);
         match views {
             Some(Views::Ring(count)) => Ok(ring(frame, up, *count, height)),
             Some(Views::Forward(count)) => Ok(forward(frame, up, *count, height)),
@@ -165,10 +164,9 @@ impl CameraArgs {
         }
     }
 
-    /// What points up, as the user, the stream, or else a guess from the first frame says.
-    pub(crate) fn up(&self, frame: &GaussianFrame, description: &SceneDescription) -> Up {
-        let said = up_of(self.up_axis(description));
-        said.or_else(|| up_of(UpGuess::of(frame).axis)).unwrap_or_default()
+    /// What points up, as the user or else the stream says; -y where neither does.
+    pub(crate) fn up(&self, description: &SceneDescription) -> Up {
+        up_of(self.up_axis(description)).unwrap_or_default()
     }
 
     /// The axis that the user, or else the stream, says points up.

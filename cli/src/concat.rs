@@ -18,10 +18,11 @@ use std::path::{Path, PathBuf};
 ///
 /// Shards of `encode --shard` are put in the order of their frames, and give the stream that a single run writes, byte
 /// for byte; a shard that is missing, damaged, or of another plan is an error. Other streams follow each other as they
-/// are given; they must have the same sequence parameters.
+/// are given; they must have the same sequence parameters. These follow from the frames, so that frames which are encoded by
+/// themselves have a grid and steps of their own: encode all frames of a programme as one sequence.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream concat shards/*.gss -o talk.gss\n  \
-    splatstream concat intro.gss talk.gss -o evening.gss")]
+    splatstream concat talk.gss talk.gss -o twice.gss")]
 pub(crate) struct Concat {
     /// Streams: all shards of a sequence in any order, or streams with the same sequence parameters.
     #[arg(required = true, value_name = "IN.gss")]
@@ -98,8 +99,8 @@ impl Concat {
         match error {
             ConcatError::Part { part, error } => of_part(&self.inputs[part], error),
             ConcatError::Differs { part, other, name: element, value, expected } => Failure::other(format!(
-                "{}: {element} is {value}, and {expected} in {}: streams are joined only if all sequence parameters are the same\n  \
-                 encode both with the same options and steps, or as the frames of one sequence",
+                "{}: {element} is {value}, and {expected} in {}: streams are joined only if all sequence parameters are the same, which follow \
+                 from the frames\n  encode all frames as one sequence, or its parts with one plan: `splatstream encode --write-plan`",
                 name(part),
                 name(other)
             )),

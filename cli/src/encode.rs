@@ -17,6 +17,7 @@ mod refinements;
 mod shards;
 pub(crate) mod warnings;
 
+use crate::assumed_up::AssumedUp;
 use crate::cameras::{BackgroundArg, CameraArgs, Views, to_stream};
 use crate::console::Console;
 use crate::failure::Failure;
@@ -30,7 +31,6 @@ use crate::setting_names::{
     AnchorName, FidelityName, ImportanceName, PredictorChoiceName, PredictorName, PresetName, QualityName,
     ShName, ToolName,
 };
-use crate::up_guess::UpGuess;
 use clap::Args;
 use core::ops::RangeInclusive;
 use decided::Decided;
@@ -328,9 +328,9 @@ impl Encode {
     fn scene(
         &self,
         first: &GaussianFrame,
-    ) -> Result<(SceneDescription, Vec<Camera>, Option<UpGuess>), Failure> {
-        let guess = self.views.up.is_none().then(|| UpGuess::of(first));
-        let mut description = self.description(guess);
+    ) -> Result<(SceneDescription, Vec<Camera>, Option<AssumedUp>), Failure> {
+        let assumed = self.views.up.is_none().then(|| AssumedUp::of(first));
+        let mut description = self.description();
         let cameras = match &self.cameras {
             None => Vec::new(),
             Some(views) => self.views.cameras(Some(views), first, &description)?,
@@ -339,7 +339,7 @@ impl Encode {
         if let Some(Views::File(_)) = &self.cameras {
             description.cameras = to_stream(cameras.get(..MAX_CAMERAS).unwrap_or(&cameras));
         }
-        Ok((description, cameras, guess))
+        Ok((description, cameras, assumed))
     }
 
     /// The settings but for the refinements, and what was decided where the options leave it open.
@@ -348,7 +348,7 @@ impl Encode {
         let layers = self.layer_count(is_predicted)?;
         self.refinements.check()?;
         let first = source.frame(0).map_err(|error| unread(error.as_ref()))?;
-        let (description, cameras, guess) = self.scene(&first)?;
+        let (description, cameras, assumed_up) = self.scene(&first)?;
         let work = Work {
             gaussians: first.len() as u64,
             sh_degree: first.sh_degree().min(self.sh_degree.unwrap_or(u8::MAX)),
@@ -398,7 +398,7 @@ impl Encode {
             ..usual
         };
         self.without.iter().for_each(|tool| tool.leave_out_of(&mut settings));
-        Ok((settings, Decided { guess, budget }))
+        Ok((settings, Decided { assumed_up, budget }))
     }
 
     /// All settings for files, which take some of the memory themselves.
@@ -431,11 +431,10 @@ impl Encode {
         self.target_bpg.map(Size::BitsPerGaussian).or(bytes)
     }
 
-    /// What the stream says about its scene, but for cameras. Of guesses it says those that something speaks for.
-    fn description(&self, guess: Option<UpGuess>) -> SceneDescription {
-        let told = guess.filter(|guess| guess.is_told()).map(|guess| guess.axis).unwrap_or_default();
+    /// What the stream says about its scene, but for cameras.
+    fn description(&self) -> SceneDescription {
         SceneDescription {
-            up_axis: self.views.up.map_or(told, Into::into),
+            up_axis: self.views.up.map(Into::into).unwrap_or_default(),
             metres_per_unit: self.metres_per_unit,
             background: self.background.background,
             title: self.title.clone(),

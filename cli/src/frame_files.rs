@@ -4,6 +4,7 @@ use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::input_args::{InputArgs, size_of, with_advice};
 use crate::likeness::Likeness;
+use crate::missing_frames::missing_frames;
 use crate::over_limit::of_encoding;
 use crate::read_notes::ReadNotes;
 use crate::standard::STANDARD;
@@ -42,6 +43,8 @@ pub(crate) struct FrameFiles {
     likeness: Likeness,
     /// What readers have noted.
     notes: ReadNotes,
+    /// What to say of frames that a directory seems to lack.
+    missing: Option<Warning>,
 }
 
 /// A frame that cannot be read, in words.
@@ -95,7 +98,9 @@ impl FrameFiles {
             }
         };
         paths.sort_by(|a, b| natural_order(&a.to_string_lossy(), &b.to_string_lossy()));
-        Self::of(paths, None, reading)
+        // Who names files one by one has chosen them.
+        let missing = if inputs.len() == paths.len() { None } else { missing_frames(&paths) };
+        Ok(Self { missing, ..Self::of(paths, None, reading)? })
     }
 
     /// The frames that came by standard input: see [`spool`].
@@ -121,7 +126,18 @@ impl FrameFiles {
             };
         let (last, keeps_last, as_is) = (None, true, false);
         let (likeness, notes) = (Likeness::default(), ReadNotes::default());
-        Ok(Self { paths, sequence, reading, last, keeps_last, as_is, spooled, likeness, notes })
+        Ok(Self {
+            paths,
+            sequence,
+            reading,
+            last,
+            keeps_last,
+            as_is,
+            spooled,
+            likeness,
+            notes,
+            missing: None,
+        })
     }
 
     /// Values are not checked.
@@ -165,9 +181,11 @@ impl FrameFiles {
         &self.likeness
     }
 
-    /// What readers have changed on the way, in the frames that were read.
+    /// What readers have changed on the way, in the frames that were read, and frames that seem to be missing.
     pub(crate) fn warnings(&self) -> Vec<Warning> {
-        self.notes.warnings(&|frame| self.name(frame))
+        let mut warnings = self.notes.warnings(&|frame| self.name(frame));
+        warnings.extend(self.missing.clone());
+        warnings
     }
 
     /// What a frame is called in messages.

@@ -3,6 +3,7 @@
 //! One file a subcommand; `console` speaks to the user, `failure` says what went wrong and what to do. A library, so that
 //! the Python package has the same command ([`main`]) and the same options of encoding ([`EncodeOptions`]).
 
+mod assumed_up;
 mod cameras;
 mod capture_files;
 mod chart;
@@ -26,6 +27,7 @@ mod likeness;
 mod machine;
 mod manual;
 mod memory_bound;
+mod missing_frames;
 mod numbers;
 mod output_directory;
 mod output_file;
@@ -46,7 +48,6 @@ mod track;
 mod train;
 mod unfinished;
 mod unpackage;
-mod up_guess;
 mod validate;
 mod view;
 mod whole_file;
@@ -58,6 +59,7 @@ use splatstream_format::syntax::SPECIFICATION;
 use std::ffi::OsString;
 use std::io::{self, Write};
 use std::iter;
+use std::sync::Arc;
 
 pub use encode::{EncodeOptions, OptionsError, Prepared};
 
@@ -123,8 +125,10 @@ pub fn main(arguments: &[OsString]) -> u8 {
         Cli::command().try_get_matches_from(arguments).unwrap_or_else(|error| refuse(&error, arguments));
     let command = name_of(&matches);
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit());
-    let console = Console::new(cli.json, cli.quiet);
+    let console = Arc::new(Console::new(cli.json, cli.quiet));
     progress::set_quiet(cli.quiet);
+    let told = Arc::clone(&console);
+    unfinished::tell_by(cli.json, move |failure| told.fail(failure));
     let ended = in_threads(cli.threads, || cli.command.run(&console));
     let kept = unfinished::end(ended.is_ok());
     match ended {

@@ -1,5 +1,6 @@
 //! `splatstream render`: frames to pictures.
 
+use crate::assumed_up::AssumedUp;
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
@@ -11,7 +12,6 @@ use crate::output_directory::{OutputDirectory, files_in, is_numbered};
 use crate::output_file::check_directory;
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
-use crate::up_guess::UpGuess;
 use clap::Args;
 use serde::Serialize;
 use splatstream_decoder::operating_point::OperatingPoint;
@@ -85,10 +85,10 @@ struct Drawn {
     /// Errors of the stream.
     errors: Vec<StreamFault>,
     /// What was taken to point up where nobody said it and cameras were made; null otherwise.
-    guessed_up: Option<Up>,
+    assumed_up: Option<Up>,
 }
 
-/// A guess.
+/// What points up where nobody says it.
 #[derive(Serialize)]
 struct Up {
     axis: &'static str,
@@ -126,7 +126,7 @@ impl Render {
             let drawing = match &mut drawing {
                 Some(drawing) => drawing,
                 None => {
-                    drawn.guessed_up = self.guessed_up(&frame, &description);
+                    drawn.assumed_up = self.assumed_up(&frame, &description);
                     drawing.insert(self.drawing(&frame, &description, &inputs)?)
                 }
             };
@@ -180,7 +180,7 @@ impl Render {
             pictures: Vec::new(),
             seconds: 0.0,
             errors: Vec::new(),
-            guessed_up: None,
+            assumed_up: None,
         }
     }
 
@@ -192,17 +192,14 @@ impl Render {
     }
 
     /// What is taken to point up, if cameras are made and nobody says it.
-    fn guessed_up(&self, frame: &GaussianFrame, description: &SceneDescription) -> Option<Up> {
+    fn assumed_up(&self, frame: &GaussianFrame, description: &SceneDescription) -> Option<Up> {
         let are_made = match &self.camera {
             Some(Views::File(_)) => false,
             Some(_) => true,
             None => description.cameras.is_empty(),
         };
         let is_said = self.cameras.up_axis(description) != UpAxis::Unknown;
-        (are_made && !is_said).then(|| {
-            let guess = UpGuess::of(frame);
-            Up { axis: guess.name(), why: guess.why() }
-        })
+        (are_made && !is_said).then(|| Up { axis: AssumedUp::NAME, why: AssumedUp::of(frame).why() })
     }
 
     fn draw(
@@ -262,9 +259,9 @@ fn is_picture(path: &Path, cameras: &[Camera]) -> bool {
 impl Drawn {
     fn text(&self) -> String {
         let count = self.pictures.len() as u64;
-        let hint = match &self.guessed_up {
+        let hint = match &self.assumed_up {
             Some(Up { axis, why }) => {
-                format!("  up           {axis}, {why}; if the pictures are upside down, give --up\n")
+                format!("  up           {axis}, {why}\n")
             }
             None => String::new(),
         };

@@ -81,6 +81,18 @@ impl LimitArgs {
     }
 }
 
+/// The failure of a directory that is given for a stream.
+fn is_directory(path: &Path) -> Failure {
+    let name = path.display();
+    let advice = match path.join("manifest.json").is_file() {
+        true => format!(
+            "it is a package: `splatstream serve {name} --player` plays it, `splatstream unpackage {name}` makes a stream of it"
+        ),
+        false => "give a file in it".to_owned(),
+    };
+    Failure::other(format!("{name}: is a directory, and no stream\n  {advice}"))
+}
+
 /// The bytes of a stream and the file they came from.
 pub(crate) struct StreamFile {
     /// The file.
@@ -93,6 +105,9 @@ impl StreamFile {
     /// Reads a file, or standard input, as far as it is a stream: of one that does not start like one only the start, which
     /// says so. It may be of any length, or have no end.
     pub(crate) fn read(path: &Path) -> Result<Self, Failure> {
+        if path.is_dir() {
+            return Err(is_directory(path));
+        }
         let bytes = match path == Path::new(STANDARD) {
             true => read_stream(io::stdin().lock()),
             false => File::open(path).and_then(read_stream),

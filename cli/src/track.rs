@@ -54,8 +54,7 @@ pub(crate) struct Track {
     /// ring:N for what is seen from all around, or forward:N.
     #[arg(long, value_name = "CAMS.json|ring:N|forward:N")]
     cameras: Views,
-    /// What points up in the scene, where the views have to be made; default is y or -y, guessed by which end of the first
-    /// frame is heavier.
+    /// What points up in the scene, where the views have to be made; default is -y, as trainers write it.
     #[arg(long, value_enum, allow_hyphen_values = true)]
     up: Option<UpName>,
     /// Pictures that are drawn of each frame.
@@ -167,7 +166,7 @@ impl Track {
             height: self.height,
             hold: self.hold as f32,
             cameras,
-            up: views.up(first, &nothing),
+            up: views.up(&nothing),
             background: self.background.colour(&nothing),
             seed: self.seed,
             ..Following::default()

@@ -9,7 +9,7 @@ pub(crate) use staging::{EARLIER, NEW, STAGING, Staging, files_below};
 
 use crate::failure::Failure;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -23,6 +23,7 @@ static STATE: Mutex<State> = Mutex::new(State {
     kept: Vec::new(),
     advice: None,
     stop: None,
+    tell: None,
 });
 
 struct State {
@@ -39,6 +40,8 @@ struct State {
     advice: Option<String>,
     /// Ends a command that can stop by itself and tell how far it came.
     stop: Option<Box<dyn Fn() + Send>>,
+    /// Says that the command was interrupted.
+    tell: Option<Box<dyn Fn(&Failure) + Send>>,
 }
 
 /// A file that goes away unless it is given a name.
@@ -133,6 +136,17 @@ pub(crate) fn stop_by(stop: impl Fn() + Send + 'static) -> Result<(), Failure> {
     listen(&mut state).map_err(|error| Failure::other(format!("cannot listen to signals: {error}")))
 }
 
+/// From now on `tell` says that a signal has ended the command: of one that has written files, and of one whose report is `awaited`,
+/// which may have none.
+pub(crate) fn tell_by(is_awaited: bool, tell: impl Fn(&Failure) + Send + 'static) {
+    let mut state = lock();
+    state.tell = Some(Box::new(tell));
+    if is_awaited {
+        // Where signals cannot be listened to, the exit code tells.
+        let _deaf = listen(&mut state);
+    }
+}
+
 /// From now on whoever ends the command is told what to do next.
 pub(crate) fn advise(advice: String) {
     lock().advice = Some(advice);
@@ -185,8 +199,11 @@ fn interrupted() {
     state.remove_empty_directories();
     let kept = state.kept_texts();
     let advice: String = kept.iter().chain(&state.advice).map(|line| format!("\n  {line}")).collect();
-    let _nobody_listens = writeln!(io::stderr().lock(), "interrupted: unfinished files are removed{advice}");
-    std::process::exit(i32::from(Failure::Interrupted(String::new()).exit_code()));
+    let failure = Failure::Interrupted(format!("interrupted: unfinished files are removed{advice}"));
+    if let Some(tell) = &state.tell {
+        tell(&failure);
+    }
+    std::process::exit(failure.exit_code().into());
 }
 
 fn builder(is_result: bool) -> tempfile::Builder<'static, 'static> {
@@ -207,6 +224,7 @@ fn mode(is_result: bool) -> u32 {
 mod tests {
     use super::*;
     use std::fs;
+    use std::io::Write;
 
     /// What is in a directory.
     fn names(directory: &Path) -> Vec<String> {

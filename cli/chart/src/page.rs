@@ -139,7 +139,7 @@ impl Page<'_> {
                 dl.facts {
                     dt { "Command" } dd { (elements::command_line(self.command)) }
                     dt { "Program" } dd { "splatstream " (env!("CARGO_PKG_VERSION")) (build) }
-                    dt { "Machine" } dd { (cores) " processors (" (system) ", " (processor) "), " (threads) " threads used" }
+                    dt { "Machine" } dd { (cores) " processors (" (system) ", " (processor) "), threads used: " (threads) }
                     dt { "Timing" } dd {
                         "median of " (self.sweep.repeat) " at quality " (self.sweep.quality().name()) ", once at others; by the clock, but for speed against size, where \
                          it is processor time of all threads, and an encoding of more than 2 seconds is timed once for each of two qualities. Encoding is from Gaussians in memory to bytes in \

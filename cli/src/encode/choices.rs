@@ -2,8 +2,8 @@
 
 use super::choice::Choice;
 use super::prune::pruned;
+use crate::assumed_up::AssumedUp;
 use crate::numbers::{counted, frames};
-use crate::up_guess::UpGuess;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped, percent};
 use splatstream_decoder::predictor::Predictor;
 use splatstream_encoder::{
@@ -19,6 +19,10 @@ fn saved(report: &Report, tool: Tool) -> Option<(f64, Basis)> {
 
 /// Every decision in the report.
 pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
+    // Nothing is chosen where nothing is coded.
+    if report.gaussians == 0 {
+        return vec![invisible(report, settings)];
+    }
     let mut choices = vec![positions(report, settings), axes(report, settings), degree(report, settings)];
     choices.extend(steps(report, settings));
     choices.extend(laws(report, settings));
@@ -43,9 +47,8 @@ pub(crate) fn choices(report: &Report, settings: &Settings) -> Vec<Choice> {
 }
 
 /// What was taken to point up where nobody said it.
-pub(super) fn up(guess: UpGuess) -> Choice {
-    let carried = if guess.is_told() { "the stream says so" } else { "the stream leaves it open" };
-    Choice::new("up", guess.name(), format!("{}; {carried}; --up changes it", guess.why()))
+pub(super) fn up(assumed: AssumedUp) -> Choice {
+    Choice::new("up", AssumedUp::NAME, assumed.why())
 }
 
 fn positions(report: &Report, settings: &Settings) -> Choice {
@@ -77,7 +80,7 @@ fn steps(report: &Report, settings: &Settings) -> Option<Choice> {
 fn axes(report: &Report, settings: &Settings) -> Choice {
     let (sorted, [bits_sorted, bits_unsorted]) = report.canonical_axes;
     let cost = format!(
-        "scale and rotation take {bits_sorted:.2} bits per Gaussian sorted, {bits_unsorted:.2} as they come"
+        "scale and rotation take {bits_sorted:.2} bits per Gaussian sorted, {bits_unsorted:.2} as they come, without contexts"
     );
     let why = match (sorted, settings.tools.axis_sort) {
         (false, false) => format!("{cost}; --without axis-sort"),

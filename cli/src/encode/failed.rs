@@ -1,6 +1,7 @@
 //! Errors of the encoder in the words of the command line.
 
 use super::finetune::not_kept;
+use super::warnings::unlike_frames;
 use crate::failure::Failure;
 use crate::frame_files::{FrameFiles, unread};
 use crate::numbers::counted;
@@ -35,11 +36,22 @@ pub(super) fn failed(source: &FrameFiles, (out, memory): (&Path, u64), error: &E
             let advice = of_encoding(asked.saturating_add(beside));
             Failure::Memory(format!("{}: {error}\n  {advice}", source.name(*frame)))
         }
-        Error::OutOfGrid { frame, farthest_row, .. } => Failure::other(format!(
-            "{}: {error}\n  repair or remove Gaussian {farthest_row} first: steps follow the whole scene, and one value far from \
-             all others can put the rest out of reach",
-            source.name(*frame)
-        )),
+        Error::OutOfGrid { frame, farthest_row, .. } => {
+            let name = source.name(*frame);
+            // Steps are those of all frames: of two scenes one may be out of reach of the other.
+            let unlike =
+                source.likeness().unlike(false).and_then(|unlike| unlike_frames(&unlike, false, None));
+            let advice = unlike.map_or_else(
+                || {
+                    format!(
+                        "repair or remove Gaussian {farthest_row} first: steps follow the whole scene, and one value far from all \
+                         others can put the rest out of reach"
+                    )
+                },
+                |warning| warning.message,
+            );
+            Failure::other(format!("{name}: {error}\n  {advice}"))
+        }
         Error::TooManyGaussians { frame, .. }
         | Error::TooManyPerSecond { frame, .. }
         | Error::OtherFrame { frame, .. }

@@ -27,7 +27,7 @@ const OUTLIER: f64 = 2.0;
 const MISSED_SIZE: f64 = 0.03;
 
 /// A warning. Codes do not change, messages may.
-#[derive(Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(crate) struct Warning {
     /// What it is about.
     pub(crate) code: &'static str,

@@ -343,3 +343,65 @@ fn bytes_on_standard_input_that_are_nothing_are_refused() {
     insta::assert_snapshot!(all);
     assert!(run(&["validate"]).stdout.is_empty());
 }
+
+/// The command waits for the rest of its input when it is interrupted.
+#[cfg(unix)]
+#[test]
+fn who_asked_for_json_is_told_of_an_interruption() {
+    use std::process::{Command, Stdio};
+    let directory = directory();
+    let frame = BuiltinScene { gaussians: 20_000, sh_degree: 0, ..BuiltinScene::default() }.frame(0);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_splatstream"))
+        .args(["encode", "-", "-o", text(&directory.path().join("scene.gss")), "--json"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // More than a pipe holds: when all is written, the command reads.
+    let scene = ply::write(&frame);
+    assert!(scene.len() > 1 << 20);
+    let mut input = child.stdin.take().unwrap();
+    std::io::Write::write_all(&mut input, &scene).unwrap();
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    drop(input);
+    assert_eq!(output.status.code(), Some(130), "{output:?}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(
+        (&report["error"]["kind"], &report["error"]["exit_code"]),
+        (&"interrupted".into(), &130.into())
+    );
+    assert!(String::from_utf8_lossy(&output.stderr).starts_with("interrupted: "));
+}
+
+#[test]
+fn frames_of_two_scenes_are_told_apart_where_one_is_out_of_reach() {
+    let directory = directory();
+    let frames = directory.path().join("frames");
+    fs::create_dir(&frames).unwrap();
+    fs::write(frames.join("frame_0.ply"), changed(|_| ())).unwrap();
+    let other = changed(|planes| {
+        planes.log_scale.iter_mut().flatten().for_each(|value| *value -= 40_000.0);
+        planes.position.iter_mut().flatten().for_each(|value| *value *= 50.0);
+    });
+    fs::write(frames.join("frame_1.ply"), other).unwrap();
+    let output = run(&["encode", text(&frames), "-o", text(&directory.path().join("scene.gss"))]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("taken for the frames of one sequence") && said.contains("--each"), "{said}");
+}
+
+#[test]
+fn a_frame_that_a_directory_seems_to_lack_is_a_warning() {
+    let directory = directory();
+    let frames = directory.path().join("frames");
+    fs::create_dir(&frames).unwrap();
+    for number in [0, 1, 3] {
+        fs::write(frames.join(format!("frame_{number:04}.ply")), changed(|_| ())).unwrap();
+    }
+    let stream = directory.path().join("scene.gss");
+    let output = run(&["encode", text(&frames), "-o", text(&stream), "--preset", "fast", "--json"]);
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let warnings = report["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|warning| warning["code"] == "missing-frames"), "{report}");
+}

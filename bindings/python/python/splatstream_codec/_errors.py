@@ -67,7 +67,8 @@ class EncodeError(Error):
     """Frames or settings that cannot be encoded.
 
     Attributes:
-        kind: "no-frames", "setting", "invalid-value", "out-of-grid", "too-many-gaussians", "not-announced", "source".
+        kind: "no-frames", "setting", "invalid-value", "out-of-grid", "too-many-gaussians", "not-announced",
+            "antialiasing", "source".
         frame: The frame, from 0, if one is at fault.
         gaussian: The row in that frame, if one is.
         property: The property by its PLY name, the attribute, or the setting, if one is.

@@ -1,19 +1,17 @@
-//! What points up in a scene, if nobody says.
+//! What is taken to point up in a scene, if nobody says.
 //!
-//! Trainers write y downwards, and readers of formats with other axes convert to that. Avatars and meshes often have y
-//! upwards. Both are told apart by what scenes stand on: a floor, a pot, shoulders. More of a scene lies at its lower end
-//! than at its upper one.
+//! Trainers write y downwards, and readers of formats with other axes convert to that, so -y points up. Some avatars and
+//! meshes have y upwards. What scenes stand on, a floor, a pot, shoulders, often makes their lower end the heavier one. That is
+//! wrong for captured rooms and for what floats, so that it is a hint and decides nothing.
 
 use splatstream_chart::quantile::ranked;
-use splatstream_format::payload::UpAxis;
 use splatstream_gaussians::GaussianFrame;
 
-/// A guess, and what speaks for it.
+/// That -y points up, and what speaks against it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct UpGuess {
-    pub(crate) axis: UpAxis,
-    /// How many times more lies at the lower end; none if the ends are too much alike to tell.
-    pub(crate) ratio: Option<f64>,
+pub(crate) struct AssumedUp {
+    /// How many times more of the scene lies at the upper end than at the lower one, where that can be told.
+    pub(crate) top_heavy: Option<f64>,
 }
 
 /// The ends are told apart from this ratio on.
@@ -22,40 +20,26 @@ const TELLING: f64 = 1.3;
 /// The part of the extent at either end that is compared.
 const END: f64 = 0.1;
 
-impl UpGuess {
-    /// A guess from the first frame of a sequence; y downwards where nothing speaks for another.
-    pub(crate) fn of(frame: &GaussianFrame) -> Self {
-        let (low, high) = ends(&weighted(frame));
-        let (axis, heavy, light) = match low > high {
-            true => (UpAxis::PlusY, low, high),
-            false => (UpAxis::MinusY, high, low),
-        };
-        let ratio = heavy / light.max(f64::MIN_POSITIVE);
-        match heavy > 0.0 && ratio >= TELLING {
-            true => Self { axis, ratio: Some(ratio) },
-            false => Self { axis: UpAxis::MinusY, ratio: None },
-        }
-    }
-
-    /// Whether it is more than what is usual.
-    pub(crate) fn is_told(self) -> bool {
-        self.ratio.is_some()
-    }
-
+impl AssumedUp {
     /// As `--up` has it.
-    pub(crate) fn name(self) -> &'static str {
-        self.axis.name().trim_start_matches('+')
+    pub(crate) const NAME: &str = "-y";
+
+    /// By the first frame of a sequence.
+    pub(crate) fn of(frame: &GaussianFrame) -> Self {
+        let (upper, lower) = ends(&weighted(frame));
+        let ratio = upper / lower.max(f64::MIN_POSITIVE);
+        Self { top_heavy: (upper > 0.0 && ratio >= TELLING).then_some(ratio) }
     }
 
-    /// What speaks for it, in words.
+    /// Why, and what to do if it is wrong, in words.
     pub(crate) fn why(self) -> String {
-        match self.ratio {
-            Some(ratio) => format!(
-                "guessed, since {:.1} times as much of the scene lies at its lower end as at its upper end",
-                ratio.min(100.0)
-            ),
-            None => "guessed, since trainers use it, and both ends of the scene are alike".to_owned(),
-        }
+        let hint = self.top_heavy.map_or_else(String::new, |ratio| {
+            let ratio = ratio.min(100.0);
+            format!(
+                ", though {ratio:.1} times as much of this scene lies at its upper end as at its lower end"
+            )
+        });
+        format!("as trainers write it{hint}; give --up y if that is upside down")
     }
 }
 
@@ -108,19 +92,19 @@ mod tests {
     use splatstream_gaussians::Planes;
 
     #[test]
-    fn a_scene_and_the_scene_upside_down_have_opposite_guesses() {
+    fn a_scene_that_is_upside_down_is_heavier_at_its_upper_end() {
         let frame = BuiltinScene { gaussians: 2_000, ..BuiltinScene::default() }.frame(0);
-        let guess = UpGuess::of(&frame);
-        assert_eq!((guess.axis, guess.is_told()), (UpAxis::MinusY, true), "{guess:?}");
+        assert_eq!(AssumedUp::of(&frame).top_heavy, None);
         let (degree, mut planes) = (frame.sh_degree(), frame.into_planes());
         planes.position[1].iter_mut().for_each(|y| *y = -*y);
-        let turned = UpGuess::of(&GaussianFrame::from_planes(degree, planes).expect("planes that fit"));
-        assert_eq!((turned.axis, turned.is_told()), (UpAxis::PlusY, true), "{turned:?}");
+        let turned = AssumedUp::of(&GaussianFrame::from_planes(degree, planes).expect("planes that fit"));
+        assert!(turned.top_heavy.is_some_and(|ratio| ratio > TELLING), "{turned:?}");
+        assert!(turned.why().contains("as much of this scene lies at its upper end"), "{}", turned.why());
     }
 
     #[test]
-    fn nothing_is_told_by_an_empty_frame() {
+    fn nothing_speaks_against_it_in_an_empty_frame() {
         let empty = GaussianFrame::from_planes(0, Planes::default()).expect("no planes");
-        assert_eq!(UpGuess::of(&empty), UpGuess { axis: UpAxis::MinusY, ratio: None });
+        assert_eq!(AssumedUp::of(&empty).top_heavy, None);
     }
 }
