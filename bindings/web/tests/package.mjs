@@ -3,12 +3,13 @@ import { spawn } from 'node:child_process';
 import { setMaxListeners } from 'node:events';
 import { existsSync, readFileSync, readdirSync, rmSync } from 'node:fs';
 import { Decoder, DecoderWorker } from '../decoder/index.js';
-import { at, nativeDigests, pointOf, splatstream } from './setting.mjs';
+import { at, nativeDigests, pointOf, splatstream, writeCameras } from './setting.mjs';
 
 /** Frames of the scene, which has GOPs of 8. */
 export const FRAMES = 96;
 
 const path = at('long', 'demo.gss');
+export const packagedPath = path;
 if (!existsSync(path)) splatstream('demo', '--out', at('long'), '--gaussians', '1500', '--frames', String(FRAMES));
 const folder = at('package');
 if (!existsSync(folder)) splatstream('package', path, '-o', folder, '--quality');
@@ -52,7 +53,18 @@ export const pause = (time) => new Promise((resolve) => setTimeout(resolve, time
 export const FRAME_TIME = 1000 / 12;
 export const broadcastPath = at('broadcast.gss');
 if (!existsSync(broadcastPath)) {
-  splatstream('encode', at('long', 'source'), '-o', broadcastPath, '--fps', '12', '--gop', '8', '--preset', 'fast', '--layers', '540,1080', '--refinements', '10,30,100');
+  // It says of its scene all that a stream can say.
+  const pose = { position: [0, -0.5, 3], axes: [[-1, 0, 0], [0, 1, 0], [0, 0, -1]], field: 0.8 };
+  const scene = ['--title', 'A broadcast', '--up=-y', '--background', '0.25,0.5,0.75', '--cameras', writeCameras([pose], 480, 270)];
+  splatstream('encode', at('long', 'source'), '-o', broadcastPath, '--fps', '12', '--gop', '8', '--preset', 'fast', '--layers', '540,1080', '--refinements', '10,30,100', ...scene);
+}
+
+/** What a stream says of itself, as the decoder of streams gives it. */
+export async function descriptionOf(stream) {
+  const decoder = await Decoder.load();
+  decoder.push(readFileSync(stream));
+  decoder.next();
+  return decoder.describe();
 }
 
 /**
@@ -173,7 +185,11 @@ const VIEW = { position: [0, 0, -5], ahead: [0, 0, 1] };
 export class Viewer {
   warnings = [];
   states = [];
+  /** What was said of the stream, and how many frames had come by then. */
+  description = null;
+  describedAfter = null;
   error = null;
+  #frames = 0;
   #worker;
   #settle = null;
 
@@ -185,7 +201,9 @@ export class Viewer {
   constructor(worker) {
     this.#worker = worker;
     const on = (type, handler) => worker.addEventListener(type, ({ detail }) => handler(detail));
+    on('description', ({ description }) => ([this.description, this.describedAfter] = [description, this.#frames]));
     on('frame', ({ frame }) => {
+      this.#frames += 1;
       this.warnings.push(...frame.warnings);
       this.#answer(frame);
     });

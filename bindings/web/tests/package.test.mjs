@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import test, { afterEach } from 'node:test';
 import { GOP, pointOf } from './setting.mjs';
-import { FRAMES, FRAME_TIME, Viewer, broadcast, broadcastPath, digestsAt, files, manifestAt, network, pause } from './package.mjs';
+import { FRAMES, FRAME_TIME, Viewer, broadcast, broadcastPath, descriptionOf, digestsAt, files, manifestAt, network, packagedPath, pause } from './package.mjs';
 
 const ADDRESS = 'http://127.0.0.1/talk/manifest.json';
 /** Milliseconds of a frame in most tests: a GOP lasts 0.2 s. */
@@ -56,6 +56,16 @@ for (const source of [{ url: 'http://127.0.0.1/talk/' }, { url: ADDRESS }, { url
     await check([await player.see(0)]);
   });
 }
+
+test('a package says of itself what its stream does, before the first frame, wherever that is', async () => {
+  const described = await descriptionOf(packagedPath);
+  assert.equal(described.upAxis, '-y');
+  for (const first of [0, 60]) {
+    const { player } = await viewer(undefined, { content: files });
+    await player.see(first);
+    assert.deepEqual([player.description, player.describedAfter], [described, 0]);
+  }
+});
 
 test('a slow network gets a lower point, and no stall after the start', async () => {
   const bytes = [...files].filter(([name]) => isMedia({ file: name })).reduce((sum, [, { length }]) => sum + length, 0);
@@ -247,6 +257,10 @@ test('a presentation that grows is followed near its end, to its last frame', as
   const { player } = await liveViewer(60);
   const frames = await player.play(FRAME_TIME);
   await check(frames, broadcastPath);
+  const { frames: count, ...described } = await descriptionOf(broadcastPath);
+  assert.deepEqual([described.title, described.background, described.cameras.length], ['A broadcast', [0.25, 0.5, 0.75], 1]);
+  // While it grows nobody knows how many frames it will have.
+  assert.deepEqual([player.description, player.describedAfter], [{ ...described, frames: 0 }, 0]);
   const [first] = frames;
   assert.ok(first.isJump && first.index > 0, JSON.stringify(first));
   for (const [place, { until, isJump }] of frames.entries()) {

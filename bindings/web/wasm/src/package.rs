@@ -3,6 +3,7 @@
 mod report;
 
 use crate::received::Received;
+use splatstream::scene::SceneDescription;
 use splatstream::{Class, Decoder, Error, Frame, OperatingPoint, Warning};
 use splatstream_stream::control::{self, Layered};
 use splatstream_stream::manifest::Manifest;
@@ -17,6 +18,8 @@ pub struct Package {
     /// Of the clock of the page, microseconds.
     now_us: u64,
     gop: OpenGop,
+    /// What the stream says of its scene, once a GOP has been opened.
+    scene: Option<SceneDescription>,
     /// Whether the last GOP has been decoded to its end.
     is_ended: bool,
     /// Whether the clock goes on from the frame that comes next, and whether it does so from the one that was given last.
@@ -75,6 +78,7 @@ impl Package {
             player,
             now_us,
             gop,
+            scene: None,
             is_ended: false,
             jumps: true,
             is_jump: false,
@@ -220,6 +224,11 @@ impl Package {
         &self.gop.decoder
     }
 
+    /// What the stream says of its scene; none before the first frame.
+    pub fn scene(&self) -> Option<&SceneDescription> {
+        self.scene.as_ref()
+    }
+
     /// Whether the last GOP has been decoded to its end.
     pub fn is_ended(&self) -> bool {
         self.is_ended
@@ -305,6 +314,7 @@ impl Package {
         while let Some(gop) = self.player.show() {
             let is_lost = gop.point.is_none();
             if let Some(chosen) = gop.point {
+                self.scene.get_or_insert_with(|| scene_of(gop.head));
                 let start = gop.head.len();
                 let received = Received::whole([gop.head, gop.units].concat());
                 let (spatial, refinement) = (chosen.spatial, chosen.refinement);
@@ -390,6 +400,14 @@ impl Package {
 
 fn parse(manifest: &[u8]) -> Result<Manifest, String> {
     Manifest::parse(manifest).map_err(|error| format!("the manifest is refused: {error}"))
+}
+
+/// What the head of a stream says of the scene. A decoder that starts at a GOP does not look at it.
+fn scene_of(head: &[u8]) -> SceneDescription {
+    let mut decoder = Received::whole(head.to_vec()).decoder();
+    // There is no frame in it, and what is wrong with it is said of the GOP that it is decoded with.
+    let _ = decoder.next_frame();
+    decoder.description().cloned().unwrap_or_default()
 }
 
 /// A loss in words.

@@ -225,8 +225,7 @@ impl Session {
         let decoder = self.decoder();
         let Some(point) = decoder.highest_point() else { return Status::NeedBytes };
         let duration = decoder.frame_duration().unwrap_or_default();
-        let none = SceneDescription::default();
-        let scene = decoder.description().unwrap_or(&none).clone();
+        let scene = self.scene().cloned().unwrap_or_default();
         let frames = self.frame_count();
         self.numbers.push(frames.into());
         self.numbers.push(duration.as_secs_f64());
@@ -250,6 +249,15 @@ impl Session {
             return package.decoder();
         }
         &self.decoder
+    }
+
+    /// What is said of the scene of what is shown.
+    fn scene(&self) -> Option<&SceneDescription> {
+        #[cfg(feature = "packages")]
+        if let Some(package) = &self.package {
+            return package.scene();
+        }
+        self.decoder.description()
     }
 
     fn frame_count(&self) -> u32 {

@@ -3,7 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a panic is a failed test")]
 
 use splatstream::Decoder;
-use splatstream_format::Limits;
+use splatstream_format::syntax::{UnitId, UnitType};
+use splatstream_format::unit::{Stream, write_unit};
+use splatstream_format::{Limits, payload};
 use splatstream_stream::package::{Options, Package as Packaged};
 use splatstream_stream::playback::{Command, Fault};
 use splatstream_wasm::package::Package;
@@ -11,9 +13,9 @@ use splatstream_wasm::session::{Session, Status};
 
 const STREAM: &[u8] = include_bytes!("../../../../examples/talk.gss");
 
-/// A session of the package of the stream, and its files.
-fn open() -> (Session, Packaged<'static>) {
-    let packaged = Packaged::of(STREAM, &Options::default(), &Limits::default()).unwrap();
+/// A session of the package of a stream, and its files.
+fn open(stream: &[u8]) -> (Session, Packaged<'_>) {
+    let packaged = Packaged::of(stream, &Options::default(), &Limits::default()).unwrap();
     let package = Package::open(packaged.manifest.to_json().as_bytes(), 0).unwrap();
     let mut session = Session::default();
     session.package = Some(package);
@@ -66,7 +68,7 @@ fn frames_of_a_package_have_the_digests_of_the_stream() {
         .map(|one| one.unwrap())
         .map(|one| (one.index(), one.digest().unwrap()))
         .collect();
-    let (mut session, packaged) = open();
+    let (mut session, packaged) = open(STREAM);
     session.set_point([9, 9, 9]);
     let mut now_us = 0;
     let mut found = Vec::new();
@@ -85,22 +87,39 @@ fn frames_of_a_package_have_the_digests_of_the_stream() {
     }
 }
 
+/// The stream, with a description that says which way is up: that of the stream leaves it open.
+fn upright() -> Vec<u8> {
+    let mut units = Stream::open(STREAM, &Limits::default()).unwrap().units().map(|unit| unit.unwrap());
+    let unit = units.find(|unit| unit.header.unit_type() == UnitType::SceneDescription).unwrap();
+    let mut scene = payload::SceneDescription::parse(unit.payload, unit.payload_at).unwrap();
+    scene.up_axis = payload::UpAxis::MinusZ;
+    let id = UnitId { unit_type: UnitType::SceneDescription, spatial_layer: 0, temporal_layer: 0, refinement: 0, frame: 0 };
+    let mut stream = STREAM[..usize::try_from(unit.at).unwrap()].to_vec();
+    write_unit(&mut stream, id, &scene.to_bytes().unwrap()).unwrap();
+    // Offsets of the index hold: the unit is as long as before.
+    stream.extend_from_slice(&STREAM[stream.len()..]);
+    stream
+}
+
 #[test]
-fn a_description_is_that_of_the_stream() {
-    let (mut session, packaged) = open();
-    assert_eq!(session.describe(), Status::NeedBytes);
-    next(&mut session, &packaged, &mut 0);
-    assert_eq!(session.describe(), Status::Done);
-    let described = session.numbers.clone();
-    let mut stream = Session::default();
-    assert!(stream.push(STREAM));
-    assert_eq!((stream.decode(), stream.describe()), (Status::Done, Status::Done));
-    assert_eq!(described, stream.numbers);
+fn a_description_is_that_of_the_stream_from_the_frame_on_that_comes_first() {
+    let stream = upright();
+    let mut whole = Session::default();
+    assert!(whole.push(&stream));
+    assert_eq!((whole.decode(), whole.describe()), (Status::Done, Status::Done));
+    for first in [0, 5] {
+        let (mut session, packaged) = open(&stream);
+        assert_eq!(session.describe(), Status::NeedBytes);
+        session.seek(first);
+        next(&mut session, &packaged, &mut 0);
+        assert_eq!(session.describe(), Status::Done);
+        assert_eq!((&session.numbers, session.numbers[5]), (&whole.numbers, 6.0));
+    }
 }
 
 #[test]
 fn what_cannot_be_had_is_said() {
-    let (mut session, _) = open();
+    let (mut session, _) = open(STREAM);
     let mut now_us = 0;
     loop {
         now_us += 100_000;
