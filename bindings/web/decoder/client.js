@@ -1,13 +1,16 @@
 // The page's side of the worker: asks for frames, and hands on what the worker posts.
 
+import { bytesOf } from './bytes.js';
+
 /** Where the worker is, if nothing else is said: beside this file. */
 const workerBeside = () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module' });
 
-/** A source whose address is not relative to the page, but whole: the worker is elsewhere. */
-function located(source) {
+/** A source as the worker takes it: its address is not relative to the page, but whole, and bytes are a Uint8Array. */
+function prepared(source) {
   const whole = (address) => new URL(address, globalThis.document?.baseURI ?? globalThis.location?.href).href;
   const addresses = Object.entries(source).filter(([name]) => name === 'url' || name === 'package');
-  return { ...source, ...Object.fromEntries(addresses.map(([name, address]) => [name, whole(address)])) };
+  const bytes = 'bytes' in source ? { bytes: bytesOf(source.bytes) } : {};
+  return { ...source, ...Object.fromEntries(addresses.map(([name, address]) => [name, whole(address)])), ...bytes };
 }
 
 /**
@@ -25,15 +28,17 @@ export class DecoderWorker extends EventTarget {
    */
   constructor(source, { point = {}, module = null, startWorker = workerBeside } = {}) {
     super();
+    // First, since it throws at bytes that are none.
+    const whole = prepared(source);
     this.#worker = startWorker();
     this.#worker.addEventListener('message', ({ data }) => this.#take(data));
     this.#worker.addEventListener('error', (event) => this.#emit('error', { message: event.message ?? 'the worker cannot be started' }));
-    this.#worker.postMessage({ type: 'open', module, point, source: located(source) });
+    this.#worker.postMessage({ type: 'open', module, point, source: whole });
   }
 
   /** The next bytes of a source that is pushed; `total` is the length of the stream, if that is known. */
   push(bytes, total = null) {
-    this.#worker.postMessage({ type: 'push', bytes, total });
+    this.#worker.postMessage({ type: 'push', bytes: bytesOf(bytes), total });
   }
 
   /** No more bytes will be pushed. */

@@ -1,6 +1,8 @@
 // The decoder in the thread that calls it: bytes in, frames as texels out. `worker.js` runs it beside a page; programs of
 // Node use it as it is.
 
+import { bytesOf } from './bytes.js';
+
 const VERSION = 2;
 const DONE = 0, NEED_BYTES = 1, END = 2, INCOMPLETE = 3;
 /** Bytes that are handed to the decoder at a time. */
@@ -46,8 +48,9 @@ export class Decoder {
     return this.#exports.memory.buffer.byteLength;
   }
 
-  /** Takes the next bytes of the stream. */
-  push(bytes) {
+  /** Takes the next bytes of the stream: an ArrayBuffer, or a view of one. */
+  push(given) {
+    const bytes = bytesOf(given);
     for (let at = 0; at < bytes.length; at += PIECE) {
       const piece = bytes.subarray(at, at + PIECE);
       const room = this.#exports.gss_room(piece.length);

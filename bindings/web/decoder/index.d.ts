@@ -97,6 +97,9 @@ export interface Description {
   cameras: Pose[];
 }
 
+/** Bytes: an ArrayBuffer, or any view of one. Of a Blob that is `await blob.arrayBuffer()`. */
+export type Bytes = ArrayBufferLike | ArrayBufferView;
+
 /** Gaussians in a row of a texture: 512. */
 export const ROW: number;
 
@@ -113,8 +116,8 @@ export class Decoder {
   static load(): Promise<Decoder>;
   /** Bytes of memory that the decoder has taken. */
   readonly memory: number;
-  /** Takes the next bytes. Throws if they are more than 1 GiB in all. */
-  push(bytes: Uint8Array): void;
+  /** Takes the next bytes. Throws if they are more than 1 GiB in all; a TypeError if they are of another type. */
+  push(bytes: Bytes): void;
   /** No more bytes will come. */
   end(): void;
   /** Decodes the next frame; null if more bytes have to come first. Throws if the stream cannot be decoded at all. */
@@ -136,7 +139,7 @@ export class Decoder {
  * folder, or of its MPD. `url` takes both: a folder ends with a slash, an MPD with `.mpd`, and anything else is a package if it
  * is JSON. `package` needs no slash.
  */
-export type Source = { url: string } | { package: string } | { bytes: Uint8Array } | Record<string, never>;
+export type Source = { url: string } | { package: string } | { bytes: Bytes } | Record<string, never>;
 
 /** What is known of the playback of a package. */
 export interface PackageState {
@@ -221,9 +224,10 @@ export interface WorkerEvents {
 
 /** Decodes and sorts in a worker: events are CustomEvents with the details of WorkerEvents. */
 export class DecoderWorker extends EventTarget {
+  /** Throws a TypeError where bytes of the source are of another type. */
   constructor(source: Source, options?: WorkerOptions);
   /** The next bytes of a source that is pushed; `total` is the length of the stream, if that is known. */
-  push(bytes: Uint8Array, total?: number | null): void;
+  push(bytes: Bytes, total?: number | null): void;
   /** No more bytes will be pushed. */
   finish(): void;
   /** Asks for a frame, sorted for a view, or with null not sorted: the answer is `frame` with this index or a higher one, or `end`. */

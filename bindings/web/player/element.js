@@ -136,11 +136,13 @@ export class SplatPlayer extends HTMLElement {
 
   /** Opens a source: { url } of a stream or a package, { package: url }, { bytes }, or {} if chunks are pushed. */
   open(source) {
+    // First, since it throws at bytes that are none: what is there goes on then.
+    const first = this.#makeTrack(source, pointOf(this.getAttribute('operating-point')));
     this.#close();
     this.#source = source;
+    this.#tracks.push(first);
     this.#say('', true);
     this.#find('bar').hidden = true;
-    const first = this.#addTrack(pointOf(this.getAttribute('operating-point')));
     this.#playback = new Playback(this.#tracks);
     this.#playback.isLooping = this.#find('loop').getAttribute('aria-pressed') === 'true';
     this.#playback.speed = Number(this.#find('speed').value);
@@ -251,10 +253,9 @@ export class SplatPlayer extends HTMLElement {
     return this.shadowRoot.getElementById(id);
   }
 
-  #addTrack(point) {
+  #makeTrack(source, point) {
     const options = { point, module: this.module, startWorker: this.startWorker };
-    const track = new Track(this.#source, options, new Scene(this.#stage.renderer), this.#controls);
-    this.#tracks.push(track);
+    const track = new Track(source, options, new Scene(this.#stage.renderer), this.#controls);
     const on = (type, handler) => track.addEventListener(type, handler);
     on('shown', ({ detail }) => this.#shown(track, detail));
     for (const type of ['arrived', 'sorted', 'ended']) on(type, () => this.#stage.invalidate());
@@ -431,7 +432,7 @@ export class SplatPlayer extends HTMLElement {
       this.#tracks.pop().close();
       this.splitter.hide();
     } else {
-      this.#addTrack(LOWEST);
+      this.#tracks.push(this.#makeTrack(this.#source, LOWEST));
       this.splitter.show(this.#tracks);
     }
     this.#find('compare').setAttribute('aria-pressed', String(!isOn));
@@ -481,7 +482,7 @@ export class SplatPlayer extends HTMLElement {
   }
 
   async #openFile(file) {
-    if (file) this.open({ bytes: new Uint8Array(await file.arrayBuffer()) });
+    if (file) this.open({ bytes: await file.arrayBuffer() });
   }
 }
 

@@ -1,4 +1,4 @@
-import type { Description, Frame, OperatingPoint, Order, PackageState, Source, Update, Vector, View } from '@splatstream/decoder';
+import type { Bytes, Description, Frame, OperatingPoint, Order, PackageState, Source, Update, Vector, View } from '@splatstream/decoder';
 
 /** A camera of a picture. */
 export interface Camera {
@@ -52,8 +52,9 @@ export class SplatPlayer extends HTMLElement {
     /** Of a package; null of a stream. */
     package: PackageState | null;
   };
+  /** Opens a source in place of the one that is there; throws a TypeError, and leaves that, where bytes are of another type. */
   open(source: Source): void;
-  push(bytes: Uint8Array, total?: number | null): void;
+  push(bytes: Bytes, total?: number | null): void;
   finish(): void;
   play(): void;
   pause(): void;

@@ -1,4 +1,4 @@
-import type { Description, Frame, OperatingPoint } from '@splatstream/decoder';
+import type { Bytes, Description, Frame, OperatingPoint } from '@splatstream/decoder';
 
 /** How a stream is played in the scene of an engine. */
 export interface StreamOptions {
@@ -44,7 +44,7 @@ export interface Playable {
   /** Goes to a frame; resolves with the frame that is shown then. */
   seek(index: number): Promise<Frame | null>;
   /** The next bytes of a source that is pushed; `total` is the length of the stream, if that is known. */
-  push(bytes: Uint8Array, total?: number | null): void;
+  push(bytes: Bytes, total?: number | null): void;
   /** No more bytes will be pushed. */
   finish(): void;
   /** Ends the worker and frees what is on the GPU. */

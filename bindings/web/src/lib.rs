@@ -30,6 +30,7 @@ macro_rules! modules {
 
 /// Everything that pages consist of, in any order.
 const MODULES: &[Module<'static>] = modules![
+    "decoder/bytes.js",
     "decoder/client.js",
     "decoder/decoder.js",
     "decoder/fetcher.js",

@@ -83,6 +83,28 @@ test('the first picture comes from the smallest prefix', async () => {
   await page.finish();
 });
 
+test('an ArrayBuffer is played, and a Blob is refused while what is there stays', async () => {
+  const page = await player();
+  const found = await page.evaluate(async () => {
+    const bytes = await (await fetch('/scene.gss')).arrayBuffer();
+    const shown = (await player.seek(3)).digest;
+    const refused = [() => player.open({ bytes: new Blob([bytes]) }), () => player.push(new Blob([bytes]))].map((call) => {
+      try {
+        return call();
+      } catch (error) {
+        return `${error.name}: ${error.message}`;
+      }
+    });
+    const still = (await player.seek(3)).digest;
+    player.open({ bytes });
+    await new Promise((resolve) => player.addEventListener('ready', resolve, { once: true }));
+    return { refused, same: [still, (await player.seek(3)).digest].every((digest) => digest === shown) };
+  });
+  assert.equal(found.same, true);
+  for (const line of found.refused) assert.match(line, /^TypeError: .*not Blob: give await blob\.arrayBuffer\(\)/);
+  await page.finish();
+});
+
 test('seeks to five places show the frames there', async () => {
   const page = await player();
   const expected = nativeDigests(POINTS[2]);

@@ -1,7 +1,7 @@
 // The decoder in Node: node --test node.test.mjs, with the variables of setting.mjs.
 import assert from 'node:assert/strict';
 import test from 'node:test';
-import { Decoder, hasSimd } from '../decoder/index.js';
+import { Decoder, DecoderWorker, hasSimd } from '../decoder/index.js';
 import { FRAMES, POINTS, damaged, nativeDigests, pointOf, stream } from './setting.mjs';
 
 /** Decodes to the end; gives the digest of every frame, and calls `each` with the decoder and the frame. */
@@ -41,6 +41,29 @@ test('pieces give the same frames, and none comes before its bytes', async () =>
   decoder.end();
   found.push(...digests(decoder));
   assert.deepEqual(found, digests(await opened()));
+});
+
+test('bytes are an ArrayBuffer or any view of one, and other things are refused by their names', async () => {
+  const whole = digests(await opened());
+  const copy = Uint8Array.from(stream);
+  // Not from the start of its buffer, and of an even length.
+  const shifted = new Uint8Array(copy.length + 8 + (copy.length % 2));
+  shifted.set(copy, 4);
+  const views = [
+    [copy.buffer], [new DataView(shifted.buffer, 4, copy.length)], [new Uint16Array(shifted.buffer, 4, copy.length >> 1), copy.subarray(copy.length & ~1)],
+  ];
+  for (const parts of views) {
+    const decoder = await Decoder.load();
+    for (const part of parts) decoder.push(part);
+    decoder.end();
+    assert.deepEqual(digests(decoder), whole);
+  }
+  const decoder = await Decoder.load();
+  assert.throws(() => decoder.push(new Blob([copy])), { name: 'TypeError', message: /not Blob: give await blob\.arrayBuffer\(\)/ });
+  for (const [other, name] of [[[1, 2], 'Array'], ['text', 'String'], [null, 'Null'], [undefined, 'Undefined'], [{ length: 4 }, 'Object']]) {
+    assert.throws(() => decoder.push(other), { name: 'TypeError', message: new RegExp(`not ${name}$`) });
+  }
+  assert.throws(() => new DecoderWorker({ bytes: new Blob([copy]) }, { startWorker: () => assert.fail('it is started') }), TypeError);
 });
 
 test('a seek gives the frame that was sought, also backwards and after the end', async () => {
