@@ -15,7 +15,7 @@ function prepared(source) {
 
 /**
  * Decodes and sorts in a worker. Events, whose `detail` index.d.ts describes: `description`, `frame`, `order`, `received`,
- * `waiting` (for bytes), `end`, `error`; of packages also `package` and `better`.
+ * `renewed`, `waiting` (for bytes), `end`, `error`; of packages also `package` and `better`.
  */
 export class DecoderWorker extends EventTarget {
   #worker;
@@ -59,6 +59,11 @@ export class DecoderWorker extends EventTarget {
     }
     this.#isSorting = true;
     this.#worker.postMessage({ type: 'sort', view });
+  }
+
+  /** Asks for all of what is shown, where the GPU has lost it. The answer is `renewed`; none before the first frame. */
+  renew() {
+    this.#worker.postMessage({ type: 'renew' });
   }
 
   /** Changes the operating point; frames that are asked for after this have it. */

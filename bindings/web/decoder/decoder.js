@@ -10,6 +10,8 @@ const PIECE = 1 << 20;
 /** Gaussians in a row of a texture, and words of a Gaussian in the base texture. */
 export const ROW = 512;
 const BASE_WORDS = 8;
+/** Words of a Gaussian in the texture of spherical harmonics, by their degree. */
+const SH_WORDS = [0, 8, 12, 24];
 
 /** A module with an instruction of 128 bits: i8x16.splat of 0, dropped. */
 const SIMD_PROBE = new Uint8Array([0, 97, 115, 109, 1, 0, 0, 0, 1, 4, 1, 96, 0, 0, 3, 2, 1, 0, 10, 9, 1, 7, 0, 65, 0, 253, 15, 26, 11]);
@@ -32,6 +34,8 @@ export async function loadModule({ packages = false } = {}) {
 /** Decodes one stream. */
 export class Decoder {
   #exports;
+  /** What was shown last, but for the rows of its textures. */
+  #shown = null;
 
   constructor(module) {
     this.#exports = new WebAssembly.Instance(module, {}).exports;
@@ -83,18 +87,18 @@ export class Decoder {
   show() {
     this.#check(this.#exports.gss_show());
     const [slots, isNew, shDegree, isAntialiased, kept, appeared, disappeared] = this.#numbers();
-    const shWords = [0, 8, 12, 24][shDegree];
-    return {
-      slots,
-      isNew: isNew === 1,
-      shDegree,
-      isAntialiased: isAntialiased === 1,
-      kept,
-      appeared,
-      disappeared,
-      base: this.#changed(0, ROW * BASE_WORDS),
-      sh: this.#changed(1, ROW * shWords),
-    };
+    this.#shown = { slots, isNew: isNew === 1, shDegree, isAntialiased: isAntialiased === 1, kept, appeared, disappeared };
+    return { ...this.#shown, base: this.#changed(0, ROW * BASE_WORDS), sh: this.#changed(1, ROW * SH_WORDS[shDegree]) };
+  }
+
+  /** All rows of the textures as they are after `show`, for those whose GPU has lost them; null before that. */
+  whole() {
+    if (this.#shown === null) return null;
+    const { slots, shDegree } = this.#shown;
+    const rows = slots / ROW;
+    const base = [this.#rows(0, ROW * BASE_WORDS, 0, rows)];
+    const sh = shDegree > 0 ? [this.#rows(1, ROW * SH_WORDS[shDegree], 0, rows)] : [];
+    return { ...this.#shown, isNew: true, base, sh };
   }
 
   /** Sorts for a camera: the slots to draw, farthest first, and the depth from which they are drawn. */
@@ -236,14 +240,16 @@ export class Decoder {
   #changed(texture, rowWords) {
     const { buffer } = this.#exports.memory;
     const runs = new Uint32Array(buffer, this.#exports.gss_dirty(texture), this.#exports.gss_dirty_length(texture));
-    const start = this.#exports.gss_texels(texture);
     const changed = [];
-    for (let at = 0; at < runs.length; at += 2) {
-      const [row, end] = [runs[at], runs[at + 1]];
-      const words = new Uint32Array(buffer, start + 4 * row * rowWords, (end - row) * rowWords).slice();
-      changed.push({ row, rows: end - row, words });
-    }
+    for (let at = 0; at < runs.length; at += 2) changed.push(this.#rows(texture, rowWords, runs[at], runs[at + 1]));
     return changed;
+  }
+
+  /** A copy of rows of a texture. */
+  #rows(texture, rowWords, row, end) {
+    const start = this.#exports.gss_texels(texture) + 4 * row * rowWords;
+    const words = new Uint32Array(this.#exports.memory.buffer, start, (end - row) * rowWords).slice();
+    return { row, rows: end - row, words };
   }
 
   #numbers() {

@@ -124,6 +124,8 @@ export class Decoder {
   next(): Frame | End | null;
   /** Puts the frame that was decoded last into the textures. */
   show(): Update;
+  /** All rows of the textures as they are after `show`, for those whose GPU has lost them; null before that. */
+  whole(): Update | null;
   /** Sorts the frame that was shown last for a camera; `ahead` is a unit vector. */
   sort(position: Vector, ahead: Vector): Order;
   /** Goes to a frame: the next one has this index, or a higher one where that is missing. */
@@ -211,6 +213,8 @@ export interface WorkerEvents {
     memory: number;
   };
   order: { order: Order; time: number };
+  /** All of what is shown, after `renew`. */
+  renewed: { update: Update; order: Order };
   received: { bytes: number; total: number | null };
   /** More bytes have to come before the frame that was asked for. */
   waiting: Record<string, never>;
@@ -232,6 +236,8 @@ export class DecoderWorker extends EventTarget {
   finish(): void;
   /** Asks for a frame, sorted for a view, or with null not sorted: the answer is `frame` with this index or a higher one, or `end`. */
   show(index: number, view: View | null): void;
+  /** Asks for all rows of what is shown and an order, where the GPU has lost them: the answer is `renewed`; none before the first frame. */
+  renew(): void;
   /** Sorts the frame that was given last for another view. */
   sort(view: View): void;
   /** Changes the operating point; frames that are asked for after this have it. `{}` leaves that of a package to the network. */

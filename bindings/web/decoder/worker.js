@@ -160,12 +160,19 @@ class Player {
     const sorted = performance.now();
     [this.#shown, this.#until] = [frame.index, frame.until];
     const times = { decode: decoded - start, pack: packed - decoded, sort: sorted - packed };
-    const buffers = [...update.base, ...update.sh].map((run) => run.words.buffer);
     const memory = this.#decoder.memory;
     const described = { ...frame, bytes: this.#bytes, warnings: this.#takeWarnings() };
-    post({ type: 'frame', wanted: this.#wanted, frame: described, update, order, times, memory }, [...buffers, order.slots.buffer]);
+    post({ type: 'frame', wanted: this.#wanted, frame: described, update, order, times, memory }, buffersOf(update, order));
     this.#wanted = null;
     this.#bytes = 0;
+  }
+
+  /** Gives all of what is shown, and the order for it. */
+  renew() {
+    const update = this.#decoder.whole();
+    if (update === null) return;
+    const order = this.#sorted();
+    post({ type: 'renewed', update, order }, buffersOf(update, order));
   }
 
   #order() {
@@ -186,6 +193,8 @@ class Player {
 }
 
 const post = (message, transfer = []) => self.postMessage(message, transfer);
+/** What is moved to the page, and not copied. */
+const buffersOf = ({ base, sh }, { slots }) => [...base, ...sh].map(({ words }) => words.buffer).concat(slots.buffer);
 const pause = () => new Promise((resolve) => setTimeout(resolve));
 
 /** What the first bytes at an address are: a stream, or JSON. */
@@ -275,6 +284,7 @@ async function take({ data: message }) {
   else if (message.type === 'finish') player.end();
   else if (message.type === 'show') player.show(message.index, message.view);
   else if (message.type === 'sort') player.sort(message.view);
+  else if (message.type === 'renew') player.renew();
   else if (message.type === 'point') player.setPoint(message.point);
   else if (message.type === 'run') player.run(message.speed);
   return undefined;

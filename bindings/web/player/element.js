@@ -1,6 +1,7 @@
 // <splat-player>: plays a stream of SplatStream. README.md has its attributes, properties and events.
 
 import { Controls } from './controls.js';
+import { listenToFiles } from './drops.js';
 import { framing } from './framing.js';
 import { icon } from './icons.js';
 import { listenToKeys } from './keys.js';
@@ -49,6 +50,7 @@ export class SplatPlayer extends HTMLElement {
   #pointShown = null;
   /** Whether a presentation was followed when the page was hidden. */
   #isAway = false;
+  #scheme = null;
 
   constructor() {
     super();
@@ -69,9 +71,16 @@ export class SplatPlayer extends HTMLElement {
     }
   };
 
+  /** The page has changed between light and dark. */
+  #onscheme = () => this.#retheme();
+
   connectedCallback() {
     document.addEventListener('visibilitychange', this.#onvisibility);
+    // Both would hold an element that is in no page.
+    this.#scheme = matchMedia('(prefers-color-scheme: dark)');
+    this.#scheme.addEventListener('change', this.#onscheme);
     if (!this.#stage && !this.#setUp()) return;
+    this.#stage.context.retake();
     const source = this.getAttribute('src');
     if (source) this.open({ url: new URL(source, document.baseURI).href });
     else this.#invite();
@@ -79,7 +88,9 @@ export class SplatPlayer extends HTMLElement {
 
   disconnectedCallback() {
     document.removeEventListener('visibilitychange', this.#onvisibility);
+    this.#scheme.removeEventListener('change', this.#onscheme);
     this.#close();
+    this.#stage?.context.release();
   }
 
   attributeChangedCallback(name, before, value) {
@@ -237,16 +248,25 @@ export class SplatPlayer extends HTMLElement {
     this.#timeline = new Timeline(this.shadowRoot);
     this.#losses = new Losses(this.#find('lost'), this.#find('lost-count'), this.#find('lost-list'));
     this.splitter = new Splitter(this.shadowRoot, this.#stage);
-    canvas.addEventListener('webglcontextlost', (event) => event.preventDefault());
-    canvas.addEventListener('webglcontextrestored', () => this.#restore());
+    this.#stage.context.onlost = () => this.#loseContext();
+    this.#stage.context.onrestored = () => this.#restoreContext();
     this.#listen();
     return true;
   }
 
-  /** After the GPU has lost everything. */
-  #restore() {
+  /** The browser has taken the context away; it gives it back when it can. Playback goes on. */
+  #loseContext() {
+    if (this.#isReady) this.#say('The browser has taken the graphics away. The picture returns with them.');
+    this.#emit('contextlost');
+  }
+
+  /** The context is there again, and the GPU has lost everything. */
+  #restoreContext() {
     this.#stage.renderer.prepare();
-    if (Object.keys(this.#source ?? {}).length > 0) this.open(this.#source);
+    for (const track of this.#tracks) track.renew();
+    this.#stage.invalidate();
+    if (this.#isReady) this.#say('');
+    this.#emit('contextrestored');
   }
 
   #find(id) {
@@ -456,33 +476,13 @@ export class SplatPlayer extends HTMLElement {
     on('home', 'click', () => this.#framing && this.#controls.place(this.#framing, this.#framing.cameras[0]));
     on('full', 'click', () => (document.fullscreenElement ? document.exitFullscreen() : this.requestFullscreen()));
     for (const id of ['quality', 'info']) on(id, 'click', () => this.#side.toggle(id));
-    on('open', 'click', () => this.#find('file').click());
-    on('file', 'change', ({ target }) => this.#openFile(target.files[0]));
-    this.#listenToDrops();
-    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => this.#retheme());
+    listenToFiles(this, this.shadowRoot, (bytes) => this.open({ bytes }));
   }
 
   #retheme() {
     if (!this.#stage) return;
     this.#stage.background = this.#background ?? this.#description?.background ?? this.#surround();
     this.#stage.invalidate();
-  }
-
-  #listenToDrops() {
-    const mark = (isOver) => (event) => {
-      event.preventDefault();
-      this.#find('drop').hidden = !isOver;
-    };
-    this.addEventListener('dragover', mark(true));
-    this.addEventListener('dragleave', mark(false));
-    this.addEventListener('drop', (event) => {
-      mark(false)(event);
-      this.#openFile(event.dataTransfer.files[0]);
-    });
-  }
-
-  async #openFile(file) {
-    if (file) this.open({ bytes: await file.arrayBuffer() });
   }
 }
 

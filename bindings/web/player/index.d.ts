@@ -17,7 +17,8 @@ export interface FixedCamera {
 }
 
 /** The element <splat-player>. README.md has its attributes; events are CustomEvents: `ready` (Description), `frame`
- * (Frame), `lost` ({ warnings, index }), `failed` ({ message }), of packages `package` (PackageState). */
+ * (Frame), `lost` ({ warnings, index }), `failed` ({ message }), of packages `package` (PackageState); `contextlost` and
+ * `contextrestored`, without detail, when the browser takes the WebGL context away and gives it back. */
 export class SplatPlayer extends HTMLElement {
   /** The decoder's module or its bytes, for pages without its file. */
   module: WebAssembly.Module | Uint8Array | null;
@@ -79,6 +80,8 @@ export class Renderer {
   readonly gl: WebGL2RenderingContext;
   readonly canvas: HTMLCanvasElement;
   constructor(canvas: HTMLCanvasElement);
+  /** To be called when a context that was lost is restored. Scenes then need an update of all rows: `DecoderWorker.renew`. */
+  prepare(): void;
   resize(width: number, height: number): void;
   /** Draws a scene over a background, in a part of the width: from and to, 0 to 1. */
   draw(scene: Scene, camera: Camera, background: Vector, part?: [number, number]): void;

@@ -10,23 +10,41 @@ const BATCH = 128;
 
 /** The Gaussians of one stream on the GPU. */
 export class Scene {
+  #renderer;
   #gl;
+  /** The generation of the renderer that the textures are of. */
+  #generation = null;
+  #count = 0;
   #base = null;
   #sh = null;
   #order = null;
   #slots = 0;
 
   constructor(renderer) {
+    this.#renderer = renderer;
     this.#gl = renderer.gl;
-    this.count = 0;
     this.near = 0;
     this.shDegree = 0;
     this.isAntialiased = false;
   }
 
-  /** Takes what a frame has changed, as the worker posts it; gives the bytes that were copied to the GPU. */
+  /** Gaussians that are drawn. */
+  get count() {
+    return this.#isThere ? this.#count : 0;
+  }
+
+  /** Whether the GPU has its textures, and has not lost them. */
+  get #isThere() {
+    return this.#generation === this.#renderer.generation && !this.#gl.isContextLost();
+  }
+
+  /**
+   * Takes what a frame has changed, as the worker posts it; gives the bytes that were copied to the GPU. Where that has lost
+   * everything, nothing is taken up to an update of all rows.
+   */
   update({ slots, isNew, shDegree, isAntialiased, base, sh }) {
-    if (isNew) this.#allocate(slots, shDegree);
+    if (isNew && !this.#gl.isContextLost()) this.#allocate(slots, shDegree);
+    if (!this.#isThere) return 0;
     this.isAntialiased = isAntialiased;
     return this.#copy(this.#base, base, BASE_TEXELS) + this.#copy(this.#sh, sh, SH_TEXELS[shDegree]);
   }
@@ -34,15 +52,16 @@ export class Scene {
   /** Takes an order to draw in. */
   setOrder({ slots, near }) {
     const gl = this.#gl;
-    this.count = Math.min(slots.length, this.#slots);
+    this.#count = Math.min(slots.length, this.#slots);
     this.near = near;
-    if (this.count === 0) return;
+    const { count } = this;
+    if (count === 0) return;
     gl.bindTexture(gl.TEXTURE_2D, this.#order);
-    const rows = Math.floor(this.count / ORDER_ROW);
+    const rows = Math.floor(count / ORDER_ROW);
     const put = (row, width, height, from) =>
       gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, row, width, height, gl.RED_INTEGER, gl.UNSIGNED_INT, slots, from);
     if (rows > 0) put(0, ORDER_ROW, rows, 0);
-    if (this.count > rows * ORDER_ROW) put(rows, this.count - rows * ORDER_ROW, 1, rows * ORDER_ROW);
+    if (count > rows * ORDER_ROW) put(rows, count - rows * ORDER_ROW, 1, rows * ORDER_ROW);
   }
 
   /** Binds the textures: the base to unit 0, the spherical harmonics to unit 1, the order to unit 2. */
@@ -56,6 +75,7 @@ export class Scene {
 
   /** Frees what it has on the GPU. */
   delete() {
+    if (!this.#isThere) return;
     for (const texture of [this.#base, this.#sh, this.#order]) this.#gl.deleteTexture(texture);
   }
 
@@ -69,6 +89,7 @@ export class Scene {
     this.#sh = shDegree > 0 ? this.#texture(gl.RGBA32UI, ROW * SH_TEXELS[shDegree], rows) : null;
     this.#order = this.#texture(gl.R32UI, ORDER_ROW, Math.ceil(slots / ORDER_ROW));
     this.#slots = slots;
+    this.#generation = this.#renderer.generation;
     this.shDegree = shDegree;
   }
 
@@ -96,6 +117,8 @@ export class Scene {
 
 /** Draws scenes into a canvas. */
 export class Renderer {
+  /** How many times it was prepared. */
+  generation = 0;
   #program;
   #uniforms = {};
   /** The triangles of an instance. */
@@ -109,9 +132,10 @@ export class Renderer {
     this.prepare();
   }
 
-  /** Makes what a context needs, also after it was lost and restored; scenes have to be made again then. */
+  /** Makes what a context needs, also after it was lost and restored; scenes need an update of all rows then. */
   prepare() {
     const gl = this.gl;
+    this.generation += 1;
     this.#program = link(gl, VERTEX, FRAGMENT);
     const names = ['base', 'harmonics', 'shDegree', 'isAntialiased', 'position', 'axes', 'focal', 'size', 'near', 'order', 'count'];
     for (const name of names) this.#uniforms[name] = gl.getUniformLocation(this.#program, name);

@@ -1,5 +1,6 @@
 // The canvas: its size in pixels, and when it is drawn.
 
+import { Context } from './context.js';
 import { Renderer } from './renderer.js';
 
 /** Milliseconds from picture to picture above which fewer pixels are drawn, and below which more. */
@@ -68,6 +69,7 @@ export class Stage {
     this.#controls = controls;
     this.#scenes = scenes;
     this.renderer = new Renderer(canvas);
+    this.context = new Context(this.renderer.gl);
     new ResizeObserver(() => this.invalidate()).observe(canvas);
   }
 

@@ -34,6 +34,7 @@ export class Track extends EventTarget {
     this.#worker = new DecoderWorker(source, options);
     const on = (type, handler) => this.#worker.addEventListener(type, ({ detail }) => handler(detail));
     on('frame', (answer) => this.#take(answer));
+    on('renewed', (all) => this.#renewed(all));
     on('order', ({ order }) => this.#sorted(order));
     on('end', ({ warnings }) => this.#end(warnings));
     on('waiting', () => this.#wait());
@@ -118,6 +119,11 @@ export class Track extends EventTarget {
     this.#worker.sort(this.#controls.view());
   }
 
+  /** Asks for all that the scene has held, since the GPU has lost it. */
+  renew() {
+    this.#worker.renew();
+  }
+
   /** Says how fast a package is played; 0 while it stands still. */
   run(speed) {
     this.#worker.run(speed);
@@ -178,6 +184,12 @@ export class Track extends EventTarget {
     this.package = state;
     if (this.isAutomatic && this.frame) this.point = this.frame.point;
     this.#emit('package', state);
+  }
+
+  /** A frame that is held back may be in it already: to write its rows again changes nothing. */
+  #renewed({ update, order }) {
+    this.scene.update(update);
+    this.#sorted(order);
   }
 
   #sorted(order) {

@@ -132,6 +132,78 @@ test('pictures are those of the renderer of the repository', async () => {
   await page.finish();
 });
 
+test('players that are removed leave their contexts to others, and take them back', async () => {
+  const page = await player({ attributes: { controls: 'none' } });
+  const [before, after] = await page.evaluate(async (count) => {
+    const lost = [];
+    player.addEventListener('contextlost', () => lost.push('the one that stays'));
+    const ready = (element) => new Promise((resolve) => element.addEventListener('ready', resolve, { once: true }));
+    const picture = async () => (await (await player.snapshot()).arrayBuffer()).byteLength;
+    const first = await picture();
+    let other;
+    for (let round = 0; round < count; round++) {
+      other = Object.assign(document.createElement('splat-player'), { style: 'height: 90px' });
+      other.setAttribute('src', '/scene.gss');
+      const isReady = ready(other);
+      document.body.append(other);
+      if (round % 4 === 0) await isReady;
+      other.remove();
+    }
+    // One that is moved, and one that comes back later.
+    document.body.append(other);
+    document.body.prepend(other);
+    await ready(other);
+    other.remove();
+    await new Promise((resolve) => setTimeout(resolve, 300));
+    document.body.append(other);
+    await ready(other);
+    await new Promise((resolve) => setTimeout(resolve, 500));
+    const gl = other.shadowRoot.getElementById('canvas').getContext('webgl2');
+    return [{ lost: [], isLost: false, bytes: first }, { lost, isLost: gl.isContextLost(), bytes: await picture() }];
+  }, 24);
+  assert.deepEqual(after, before);
+  await page.finish();
+});
+
+test('a context that is lost is restored, and the picture with it', async () => {
+  const page = await player({ attributes: { controls: 'none' } });
+  const shown = await page.evaluate(async () => {
+    const bytes = new Uint8Array(await (await fetch('/scene.gss')).arrayBuffer());
+    player.open({});
+    player.push(bytes);
+    player.finish();
+    await new Promise((resolve) => player.addEventListener('ready', resolve, { once: true }));
+    const pause = () => new Promise((resolve) => setTimeout(resolve, 500));
+    const base64 = async () => {
+      await pause();
+      const picture = new Uint8Array(await (await player.snapshot()).arrayBuffer());
+      return btoa(picture.reduce((text, byte) => text + String.fromCharCode(byte), ''));
+    };
+    const event = (name) => new Promise((resolve) => player.addEventListener(name, resolve, { once: true }));
+    const pictures = [await player.seek(5), await base64()];
+    const extension = player.shadowRoot.getElementById('canvas').getContext('webgl2').getExtension('WEBGL_lose_context');
+    for (const meanwhile of [5, 17]) {
+      const lost = event('contextlost');
+      extension.loseContext();
+      await lost;
+      await player.seek(meanwhile);
+      await pause();
+      const said = player.shadowRoot.getElementById('said').textContent;
+      const restored = event('contextrestored');
+      extension.restoreContext();
+      await restored;
+      pictures.push(said, await base64());
+    }
+    return [...pictures, await player.seek(5), await base64()].filter((part) => typeof part === 'string');
+  });
+  const [before, said, , , after, last] = shown;
+  assert.match(said, /graphics/);
+  assert.equal(shown[2], before);
+  assert.notEqual(after, before);
+  assert.equal(last, before);
+  await page.finish();
+});
+
 /** In the page: the picture of a camera as PNG in base64. */
 async function pictureOf(camera) {
   await player.seek(5);
