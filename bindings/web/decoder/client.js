@@ -15,7 +15,7 @@ function prepared(source) {
 
 /**
  * Decodes and sorts in a worker. Events, whose `detail` index.d.ts describes: `description`, `frame`, `order`, `received`,
- * `renewed`, `waiting` (for bytes), `end`, `error`; of packages also `package` and `better`.
+ * `renewed`, `waiting` (for bytes), `end`, `error`; of packages also `package`, `better` and `best`.
  */
 export class DecoderWorker extends EventTarget {
   #worker;

@@ -209,6 +209,11 @@ export class Decoder {
     return this.#exports.gss_package_is_better() === 1;
   }
 
+  /** Whether nothing is missing that would make that frame better. */
+  get isBest() {
+    return this.#exports.gss_package_is_best() === 1;
+  }
+
   /** Playback moves at a speed, or stands still at 0. */
   run(speed) {
     this.#exports.gss_package_run(Math.round(1000 * speed));

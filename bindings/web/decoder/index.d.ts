@@ -222,6 +222,8 @@ export interface WorkerEvents {
   package: { state: PackageState };
   /** The frame that stands still can be had better: ask for it again. */
   better: { index: number };
+  /** The frame that stands still is the best that can be had, since all of its GOP is there that the operating point has. */
+  best: { index: number };
   end: { wanted: number; warnings: string[] };
   error: { message: string };
 }

@@ -57,6 +57,7 @@ class Player {
     this.#wanted = index;
     this.#advance();
     this.#fetcher?.tick();
+    this.#announce();
   }
 
   /** Plays the package with a manifest at an address. */
@@ -89,11 +90,18 @@ class Player {
       this.#fetcher.close();
       post({ type: 'error', message: reason(error) });
     }
-    if (this.#wanted === null && !this.#isAnnounced && this.#decoder.isBetter) {
-      this.#isAnnounced = true;
-      post({ type: 'better', index: this.#shown });
-    }
+    this.#announce();
     this.#report(REPORTED);
+  }
+
+  /** Says once of the frame that stands of a package that it can be had better, or that it is the best that can be had. */
+  #announce() {
+    if (!this.#fetcher || this.#wanted !== null || this.#isAnnounced) return;
+    const isBest = () => this.#speed === 0 && this.#decoder.isBest;
+    const type = this.#decoder.isBetter ? 'better' : isBest() ? 'best' : null;
+    if (type === null) return;
+    this.#isAnnounced = true;
+    post({ type, index: this.#shown });
   }
 
   /** Reports a package, if that was not done for so many milliseconds. */

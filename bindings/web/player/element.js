@@ -188,10 +188,9 @@ export class SplatPlayer extends HTMLElement {
     else this.play();
   }
 
-  /** Goes to a frame; resolves with the frame that is shown then. */
+  /** Goes to a frame; resolves with the frame that is shown then: see index.d.ts. */
   async seek(index) {
-    this.#playback.seek(index);
-    await this.#tracks[0].settled();
+    await this.#playback?.reach(index);
     return this.frame;
   }
 

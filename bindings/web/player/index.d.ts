@@ -60,7 +60,13 @@ export class SplatPlayer extends HTMLElement {
   play(): void;
   pause(): void;
   togglePlay(): void;
-  /** Goes to a frame; resolves with the frame that is shown then. */
+  /**
+   * Goes to a frame; resolves with the frame that is shown then. Of a stream that is the frame `index` or, where it is missing,
+   * the next one. Of a package it is that frame too, as soon as the network has brought it; if the operating point has no such
+   * frame, or no more of it can be had, it is the nearest one before, which stands for it: `frame.index <= index < frame.until`.
+   * An operating point that is chosen with its highest temporal layer has all frames. A package that plays stands still
+   * for this for a second at most; then it plays on, and resolves with what is shown.
+   */
   seek(index: number): Promise<Frame | null>;
   /** Goes to where a presentation that grows is followed, and plays. */
   goLive(): void;

@@ -41,6 +41,7 @@ export const playable = (Base) =>
       const on = (type, handler) => track.addEventListener(type, ({ detail }) => handler(detail));
       on('description', ({ description }) => this.#describe(description));
       on('shown', ({ frame }) => this.#shown(frame, autoplay));
+      on('better', () => this.#playback.improve(track));
       on('ended', () => this.#playback.ended(track));
       on('warnings', (lost) => lost.warnings.length > 0 && this.announce('lost', lost));
       on('failed', (failure) => this.announce('failed', failure));
@@ -95,8 +96,7 @@ export const playable = (Base) =>
     }
 
     async seek(index) {
-      this.#playback.seek(index);
-      await this.#track.settled();
+      await this.#playback.reach(index);
       return this.frame;
     }
 
@@ -129,6 +129,7 @@ export const playable = (Base) =>
       if (!this.#isReady) {
         this.#isReady = true;
         if (autoplay) this.play();
+        else this.#playback.pace();
         this.announce('ready', this.#description);
       }
       this.announce('frame', frame);

@@ -5,6 +5,9 @@ const MOST_SKIPPED = 6;
 /** The clock waits for frames that are later than this, seconds. */
 const LATEST = 0.25;
 
+/** Milliseconds that the clock waits for the frame of a package that was sought while it plays. */
+const PATIENCE = 1000;
+
 /** A frame that stands for others is followed by the next one so many frames before that is due. */
 const AHEAD = 2;
 
@@ -21,6 +24,8 @@ export class Playback {
   /** What is known of a package; null of a stream. */
   #package = null;
   #hasPlayed = false;
+  /** How many seeks hold the clock. */
+  #holds = 0;
   #tracks;
   #speed = 1;
   /** Where the clock stands, and when it was looked at last, milliseconds. */
@@ -87,7 +92,7 @@ export class Playback {
 
   /** Says how fast packages are played. */
   pace() {
-    for (const track of this.#tracks) track.run(this.isPlaying ? this.#speed : 0);
+    for (const track of this.#tracks) track.run(this.isPlaying && this.#holds === 0 ? this.#speed : 0);
   }
 
   /** Takes what the stream says of its length. */
@@ -136,11 +141,32 @@ export class Playback {
     for (const track of this.#tracks) track.seek(frame);
   }
 
+  /**
+   * Goes to a frame; resolves when it is shown, or else the nearest one before it that can be had. Of a package the first frame
+   * of a GOP is there before the others, and what stands still gets better: so the clock stands for a while.
+   */
+  async reach(index) {
+    const [leader] = this.#tracks;
+    this.seek(index);
+    if (leader.package === null) return leader.settled();
+    this.#hold(1);
+    let timer;
+    const isLate = new Promise((resolve) => (timer = setInterval(() => this.isPlaying && resolve(), PATIENCE)));
+    await Promise.race([leader.settled(), isLate]);
+    clearInterval(timer);
+    return this.#hold(-1);
+  }
+
+  #hold(by) {
+    this.#holds += by;
+    this.pace();
+  }
+
   /** Shows what is due, and asks for what comes next. `now` is in milliseconds. */
   tick(now) {
     const passed = this.#last === null ? 0 : (now - this.#last) / 1000;
     this.#last = now;
-    if (!this.isPlaying) return;
+    if (!this.isPlaying || this.#holds > 0) return;
     if (this.#tracks.some((track) => track.frame === null)) return;
     this.#time += passed * this.#speed * (this.#package?.pace ?? 1);
     for (const track of this.#tracks) this.#serve(track);

@@ -17,6 +17,9 @@ export class Track extends EventTarget {
   #asked = null;
   #next = null;
   #held = null;
+  /** The frame that was sought last, and whether what stands for it is the best that can be had. */
+  #sought = 0;
+  #isBest = false;
   #history = [];
 
   constructor(source, options, scene, controls) {
@@ -40,6 +43,7 @@ export class Track extends EventTarget {
     on('waiting', () => this.#wait());
     on('error', ({ message }) => this.#fail(message));
     on('package', ({ state }) => this.#report(state));
+    on('best', () => this.#settleForBest());
     for (const type of ['description', 'received', 'better']) on(type, (detail) => this.#emit(type, detail));
     this.seek(0);
   }
@@ -49,9 +53,10 @@ export class Track extends EventTarget {
     return this.#asked !== null;
   }
 
-  /** Whether the frame is there that was sought last. */
+  /** Whether the frame is there that was sought last, or what stands for it, which of a package may be replaced later. */
   get isSettled() {
-    return this.#asked === null && this.#next === null;
+    if (this.#asked !== null || this.#next !== null) return false;
+    return this.package === null || this.isEnded || this.#isBest || this.frame.index >= this.#sought;
   }
 
   /** Whether the operating point is left to the network. */
@@ -77,16 +82,17 @@ export class Track extends EventTarget {
   seek(index) {
     this.release();
     this.isEnded = false;
+    this.#sought = index;
     if (this.#asked === null) this.#ask(index, true);
     else this.#next = index;
   }
 
-  /** Resolves once the frame is there that was sought last, or cannot come. */
+  /** Resolves once the frame is there that was sought last, or cannot come; at once if the track is closed. */
   settled() {
-    const types = ['shown', 'ended', 'failed'];
+    const types = ['shown', 'best', 'ended', 'failed', 'closed'];
     return new Promise((resolve) => {
-      const listen = () => {
-        if (!this.isSettled) return;
+      const listen = ({ type }) => {
+        if (type !== 'closed' && !this.isSettled) return;
         for (const type of types) this.removeEventListener(type, listen);
         resolve();
       };
@@ -142,6 +148,7 @@ export class Track extends EventTarget {
   close() {
     this.#worker.close();
     this.scene.delete();
+    this.#emit('closed');
   }
 
   #ask(index, isUrgent) {
@@ -152,6 +159,7 @@ export class Track extends EventTarget {
   #take(answer) {
     const isUrgent = this.#asked?.isUrgent || this.#next !== null || answer.wanted !== this.#asked?.index;
     if (answer.wanted === this.#asked?.index) this.#asked = null;
+    this.#isBest = false;
     this.#emit('warnings', { warnings: answer.frame.warnings, index: answer.frame.index });
     if (answer.frame.isJump) this.#emit('jumped', answer.frame);
     if (isUrgent) this.#show(answer, true);
@@ -190,6 +198,11 @@ export class Track extends EventTarget {
   #renewed({ update, order }) {
     this.scene.update(update);
     this.#sorted(order);
+  }
+
+  #settleForBest() {
+    this.#isBest = this.#asked === null;
+    this.#emit('best');
   }
 
   #sorted(order) {

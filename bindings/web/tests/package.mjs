@@ -217,6 +217,7 @@ export class Viewer {
     });
     on('package', ({ state }) => this.states.push(state));
     on('better', ({ index }) => (this.better = index));
+    on('best', ({ index }) => (this.best = index));
   }
 
   get worker() {

@@ -189,6 +189,23 @@ test('what stands still gets better until nothing is missing', async () => {
   assert.ok(points.every((point, place) => place === 0 || point >= points[place - 1]), points.join());
 });
 
+for (const [name, behaviour] of [['all of it is there', () => ({})], ['nothing improves it', (request) => (isEnhancement(request) ? { status: 404 } : {})]]) {
+  test(`what stands still is said to be the best when ${name}`, async () => {
+    const { player } = await viewer(behaviour);
+    player.worker.run(0);
+    let frame = await player.see(12);
+    for (let wait = 0; wait < 500 && player.best === undefined; wait++) {
+      await pause(20);
+      if (player.better === undefined) continue;
+      player.better = undefined;
+      frame = await player.see(12);
+    }
+    assert.equal(player.best, frame.index);
+    assert.ok(frame.index <= 12 && 12 < frame.until, JSON.stringify(frame));
+    await check([frame]);
+  });
+}
+
 test('GOPs that were shown are shown again without a request', async () => {
   const { player, requests } = await viewer(undefined, { options: { point: best } });
   await player.play(FRAME);

@@ -114,6 +114,53 @@ test('seeks to five places of a package are exact, and what stands still gets be
   await check(await page.finish());
 });
 
+/** What seeks resolve with, one after the other, and how many milliseconds each takes. */
+const seeks = (page, indices) => page.evaluate(async (wanted) => {
+  const found = [];
+  for (const index of wanted) {
+    const start = performance.now();
+    const { index: shown, until, point, digest } = await player.seek(index);
+    found.push({ wanted: index, index: shown, until, point, digest, time: performance.now() - start });
+  }
+  return found;
+}, indices);
+
+const stands = ({ wanted, index, until }) => index <= wanted && wanted < until;
+
+test('a seek resolves with the frame that was asked for, or with what stands for it at the best point', async () => {
+  const page = await player(await served(40, '--latency', '20'), { autoplay: 'no' });
+  const found = await seeks(page, [12, 61, 3, 95, 0, 42]);
+  // The best point of this scene has every second frame.
+  assert.ok(found.every((one) => stands(one) && one.until <= one.index + 2 && one.point.refinement === 2), JSON.stringify(found));
+  await check(found);
+  await check(await page.finish());
+});
+
+test('a seek while a package plays resolves soon, and playback goes on', async () => {
+  const fast = await player(await served(40));
+  const [found] = await seeks(fast, [61]);
+  assert.ok(stands(found) && found.until <= 62, JSON.stringify(found));
+  await fast.waitForFunction(() => player.isPlaying && player.frame.index >= 66);
+  await check(await fast.finish());
+  const trace = at('slower.csv');
+  writeFileSync(trace, 't_s,mbps\n0,0.2\n1000,0.2\n');
+  const slow = await player(await served(125, '--shape', trace));
+  const [late] = await seeks(slow, [61]);
+  assert.ok(late.index <= 61 && late.time < 8000, JSON.stringify(late));
+  await slow.waitForFunction(() => player.isPlaying && player.frame.index >= 64, null, { timeout: 60_000 });
+  await check(await slow.finish());
+});
+
+test('a seek resolves with what stands for the frame where nothing improves it', async () => {
+  const folder = at('package-40');
+  const url = await served(40);
+  for (const name of files.keys()) if (/^(s1|t\d)\.mp4$/.test(name)) rmSync(join(folder, name));
+  const page = await player(url, { autoplay: 'no' });
+  const [found] = await seeks(page, [61]);
+  assert.ok(stands(found) && found.point.spatial === 0, JSON.stringify(found));
+  await check(await page.finish());
+});
+
 test('an operating point can be chosen, and left to the network again', async () => {
   const page = await player(await served(40), { 'operating-point': 's1,t1,r2', autoplay: 'no' });
   const exact = await page.evaluate(async (indices) => {

@@ -184,6 +184,13 @@ impl Package {
             && self.player.is_due()
     }
 
+    /// Whether nothing is missing that would make the frame better that was given last.
+    pub fn is_best(&self) -> bool {
+        let state = self.player.state();
+        let is_there = || state.choices(state.current()).iter().all(|choice| choice.bytes == 0);
+        self.gop.is_open && state.current() == self.gop.number && !self.player.is_due() && is_there()
+    }
+
     /// Plays at a speed in thousandths, or stands still at 0.
     pub fn run(&mut self, speed_milli: u32) {
         if !self.is_moving() {

@@ -161,6 +161,12 @@ pub extern "C" fn gss_package_is_better() -> u32 {
     with(|session| session.package.as_ref().is_some_and(Package::is_better)).into()
 }
 
+/// [`Package::is_best`].
+#[unsafe(no_mangle)]
+pub extern "C" fn gss_package_is_best() -> u32 {
+    with(|session| session.package.as_ref().is_some_and(Package::is_best)).into()
+}
+
 /// [`Package::run`].
 #[unsafe(no_mangle)]
 pub extern "C" fn gss_package_run(speed_milli: u32) {
