@@ -274,7 +274,7 @@ async function moduleFor({ module, source }, started) {
 
 let opening = null;
 
-/** A message; those that need the player wait until it is there. */
+/** A message; those that need the player wait until it is there. Where it cannot be, only the first one says so. */
 async function take({ data: message }) {
   if (message.type === 'open') {
     const started = begin(message.source);
@@ -287,7 +287,8 @@ async function take({ data: message }) {
     post({ type: 'opened' });
     return feed(player, message.source, started);
   }
-  const player = await opening;
+  const player = await opening.catch(() => null);
+  if (player === null) return undefined;
   if (message.type === 'push') player.push(message.bytes, message.total);
   else if (message.type === 'finish') player.end();
   else if (message.type === 'show') player.show(message.index, message.view);

@@ -81,6 +81,7 @@ export class SplatPlayer extends HTMLElement {
     this.#scheme.addEventListener('change', this.#onscheme);
     if (!this.#stage && !this.#setUp()) return;
     this.#stage.context.retake();
+    this.#retheme();
     const source = this.getAttribute('src');
     if (source) this.open({ url: new URL(source, document.baseURI).href });
     else this.#invite();
@@ -291,6 +292,8 @@ export class SplatPlayer extends HTMLElement {
     this.#description = null;
     this.#framing = null;
     this.#isReady = false;
+    // The colour around the scene was that of the stream.
+    this.#retheme();
     this.#losses?.clear();
     this.#side.show(null);
     this.splitter?.hide();

@@ -93,7 +93,8 @@ dd { margin: 0; text-align: right; font-variant-numeric: tabular-nums; }
 .side-name { position: absolute; bottom: 118px; padding: 4px 10px; font-size: 12px; border-radius: 9px; pointer-events: none; }
 .message { position: absolute; inset: 0; display: grid; place-content: center; justify-items: center; gap: 14px; text-align: center; padding: 24px; pointer-events: none; }
 .message > * { pointer-events: auto; }
-.message p { margin: 0; max-width: 46ch; }
+.message p { margin: 0; max-width: 46ch; overflow-wrap: anywhere; }
+.message p:not(:empty) { padding: 8px 16px; border-radius: 14px; background: var(--panel); }
 .message .open { padding: 8px 18px 8px 12px; grid-auto-flow: column; gap: 8px; border: 1px solid var(--line); background: var(--panel); font-weight: 600; }
 .ring { width: 34px; height: 34px; border-radius: 50%; border: 3px solid var(--line); border-top-color: var(--accent); animation: turn 1s linear infinite; }
 @keyframes turn { to { rotate: 1turn; } }

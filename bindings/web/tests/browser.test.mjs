@@ -227,6 +227,47 @@ test('a damaged stream keeps playing and says what was lost', async () => {
   await page.finish();
 });
 
+/** In the page: the contrast of the words in the middle with what is behind them, of the pixels of a screenshot of them. */
+async function contrast(png) {
+  const bitmap = await createImageBitmap(await (await fetch(`data:image/png;base64,${png}`)).blob());
+  const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d');
+  context.drawImage(bitmap, 0, 0);
+  const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+  const linear = (code) => (code <= 10 ? code / 3295 : ((code / 255 + 0.055) / 1.055) ** 2.4);
+  const lights = Array.from({ length: data.length / 4 }, (_, at) => {
+    const [red, green, blue] = data.subarray(4 * at, 4 * at + 3);
+    return 0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue);
+  });
+  lights.sort((one, other) => one - other);
+  return (lights.at(-1) + 0.05) / (lights[0] + 0.05);
+}
+
+for (const scheme of ['light', 'dark']) {
+  test(`a wrong address is said once, in words that can be read, in the ${scheme} theme`, async () => {
+    for (const [address, colour] of [['/none.gss', null], ['/none/', [0, 0, 0]], ['/none/', [1, 1, 1]]]) {
+      const page = await browser.newPage({ viewport: SIZE, colorScheme: scheme });
+      await page.goto(server.url);
+      const failures = await page.evaluate(async ([src, background]) => {
+        globalThis.player = document.createElement('splat-player');
+        const heard = [];
+        player.addEventListener('failed', ({ detail }) => heard.push(detail.message));
+        player.setAttribute('src', src);
+        document.body.append(player);
+        player.backgroundColour = background;
+        await new Promise((resolve) => setTimeout(resolve, 1500));
+        return heard;
+      }, [address, colour]);
+      assert.deepEqual(failures.map((message) => /404/.test(message)), [true]);
+      const said = page.locator('#said');
+      assert.match(await said.innerText(), /cannot be played.*404/);
+      const png = await said.screenshot({ path: at(`failed-${scheme}.png`) });
+      assert.ok((await page.evaluate(contrast, png.toString('base64'))) > 7);
+      await page.screenshot({ path: at(`failed-page-${scheme}${colour ? colour[0] : ''}.png`) });
+      await page.close();
+    }
+  });
+}
+
 test('it plays, loops, and keys work', async () => {
   const page = await player({ size: { width: 160, height: 90 } });
   await page.evaluate(() => {
