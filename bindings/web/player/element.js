@@ -1,11 +1,13 @@
 // <splat-player>: plays a stream of SplatStream. README.md has its attributes, properties and events.
 
+import { pointOf, reflect, takeEarly } from './attributes.js';
 import { Controls } from './controls.js';
 import { listenToFiles } from './drops.js';
 import { framing } from './framing.js';
 import { icon } from './icons.js';
 import { listenToKeys } from './keys.js';
 import { Losses } from './losses.js';
+import { Message } from './message.js';
 import { pointText } from './panel.js';
 import { Playback } from './playback.js';
 import { Scene } from './renderer.js';
@@ -21,14 +23,11 @@ const STEP = 0.07;
 const SPEEDS = [0.25, 0.5, 1, 2];
 const LOWEST = { spatial: 0, temporal: 0, refinement: 0 };
 
-/** What a text such as s0,t1,r2 names. */
-function pointOf(text) {
-  const found = /^s(\d+),t(\d+),r(\d+)$/.exec(text ?? '');
-  return found ? { spatial: Number(found[1]), temporal: Number(found[2]), refinement: Number(found[3]) } : {};
-}
+/** Where there is none, as in Node, the class can be named, but not made. */
+const Base = globalThis.HTMLElement ?? class {};
 
-export class SplatPlayer extends HTMLElement {
-  static observedAttributes = ['src'];
+export class SplatPlayer extends Base {
+  static observedAttributes = ['src', 'operating-point', 'controls', 'resolution', 'theme'];
   /** Given to the worker: see DecoderWorker. Pages that hold everything themselves set them. */
   module = null;
   startWorker = undefined;
@@ -44,10 +43,13 @@ export class SplatPlayer extends HTMLElement {
   #timeline = null;
   #interval = null;
   #side;
+  #message;
   #isReady = false;
   #drawn = null;
   #background = null;
   #pointShown = null;
+  /** The operating point of the source that comes next, if it is not that of the attribute. */
+  #pending = null;
   /** Whether a presentation was followed when the page was hidden. */
   #isAway = false;
   #scheme = null;
@@ -55,6 +57,7 @@ export class SplatPlayer extends HTMLElement {
   constructor() {
     super();
     this.attachShadow({ mode: 'open' }).innerHTML = TEMPLATE;
+    this.#message = new Message(this.shadowRoot);
     this.#side = new Side(this.shadowRoot, () => this.#known(), (track, point) => this.#choose(track, point));
   }
 
@@ -75,16 +78,16 @@ export class SplatPlayer extends HTMLElement {
   #onscheme = () => this.#retheme();
 
   connectedCallback() {
+    takeEarly(this);
     document.addEventListener('visibilitychange', this.#onvisibility);
     // Both would hold an element that is in no page.
     this.#scheme = matchMedia('(prefers-color-scheme: dark)');
     this.#scheme.addEventListener('change', this.#onscheme);
     if (!this.#stage && !this.#setUp()) return;
     this.#stage.context.retake();
-    this.#retheme();
-    const source = this.getAttribute('src');
-    if (source) this.open({ url: new URL(source, document.baseURI).href });
-    else this.#invite();
+    this.#applyAttributes();
+    if (this.src) this.open({ url: new URL(this.src, document.baseURI).href });
+    else this.#message.say('Drop a stream here, or choose one. It stays on this device.', { isOpen: true });
   }
 
   disconnectedCallback() {
@@ -95,7 +98,17 @@ export class SplatPlayer extends HTMLElement {
   }
 
   attributeChangedCallback(name, before, value) {
-    if (this.isConnected && this.#stage && value !== null && before !== value) this.open({ url: new URL(value, document.baseURI).href });
+    if (!this.isConnected || !this.#stage || before === value) return;
+    if (name === 'operating-point') this.operatingPoint = pointOf(value);
+    else if (name !== 'src') this.#applyAttributes();
+    else if (value !== null) this.open({ url: new URL(value, document.baseURI).href });
+  }
+
+  /** Looks as its attributes say. */
+  #applyAttributes() {
+    this.#find('bar').hidden = !this.#isReady || !this.controls;
+    this.#stage.isAdaptive = this.resolution !== 'full';
+    this.#retheme();
   }
 
   /** The frame that is shown: see Frame of the decoder; null before the first. */
@@ -124,7 +137,10 @@ export class SplatPlayer extends HTMLElement {
   }
 
   set operatingPoint(point) {
-    this.#tracks[0]?.setPoint(point ?? {}, this.#playback.index);
+    const [track] = this.#tracks;
+    // What is set before there is a source is for the first one.
+    if (!track) this.#pending = point;
+    track?.setPoint(point ?? {}, this.#playback.index);
     if (this.#side.open === 'quality') this.#side.fill();
   }
 
@@ -149,11 +165,12 @@ export class SplatPlayer extends HTMLElement {
   /** Opens a source: { url } of a stream or a package, { package: url }, { bytes }, or {} if chunks are pushed. */
   open(source) {
     // First, since it throws at bytes that are none: what is there goes on then.
-    const first = this.#makeTrack(source, pointOf(this.getAttribute('operating-point')));
+    const first = this.#makeTrack(source, this.#pending ?? pointOf(this.getAttribute('operating-point')));
     this.#close();
+    this.#pending = null;
     this.#source = source;
     this.#tracks.push(first);
-    this.#say('', true);
+    this.#message.say('', { isBusy: true });
     this.#find('bar').hidden = true;
     this.#playback = new Playback(this.#tracks);
     this.#playback.isLooping = this.#find('loop').getAttribute('aria-pressed') === 'true';
@@ -234,14 +251,14 @@ export class SplatPlayer extends HTMLElement {
   /** Makes what lasts as long as the element; false if it cannot draw. */
   #setUp() {
     const canvas = this.#find('canvas');
+    this.#find('full').hidden = !document.fullscreenEnabled;
     this.#controls = new Controls(canvas);
     try {
       this.#stage = new Stage(canvas, this.#controls, () => this.#tracks.map((track) => track.scene));
     } catch (error) {
-      this.#say(error.message);
+      this.#message.say(error.message);
       return false;
     }
-    this.#stage.isAdaptive = this.getAttribute('resolution') !== 'full';
     this.#stage.ontick = (now) => this.#tick(now);
     this.#stage.ondraw = (interval) => this.#drewPicture(interval);
     this.#controls.onchange = () => this.#moved();
@@ -256,7 +273,7 @@ export class SplatPlayer extends HTMLElement {
 
   /** The browser has taken the context away; it gives it back when it can. Playback goes on. */
   #loseContext() {
-    if (this.#isReady) this.#say('The browser has taken the graphics away. The picture returns with them.');
+    if (this.#isReady) this.#message.say('The browser has taken the graphics away. The picture returns with them.');
     this.#emit('contextlost');
   }
 
@@ -265,7 +282,7 @@ export class SplatPlayer extends HTMLElement {
     this.#stage.renderer.prepare();
     for (const track of this.#tracks) track.renew();
     this.#stage.invalidate();
-    if (this.#isReady) this.#say('');
+    if (this.#isReady) this.#message.say('');
     this.#emit('contextrestored');
   }
 
@@ -335,12 +352,12 @@ export class SplatPlayer extends HTMLElement {
   /** The first picture is there. */
   #begin() {
     this.#isReady = true;
-    this.#say('');
+    this.#message.say('');
     const { isMoving } = this.#playback;
-    this.#find('bar').hidden = this.getAttribute('controls') === 'none';
+    this.#applyAttributes();
     this.#timeline.prepare(this.#playback);
     const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
-    if (isMoving && !calm && this.getAttribute('autoplay') !== 'no') this.play();
+    if (isMoving && !calm && this.autoplay) this.play();
     else this.#playback.pace();
     this.#showPlay();
     this.#emit('ready', this.#description);
@@ -357,7 +374,7 @@ export class SplatPlayer extends HTMLElement {
     this.#received = { bytes: state.bytes, total: null };
     this.#timeline.follow(state, this.#playback);
     if (state.isLive) this.#showPlace();
-    if (this.#isReady) this.#say('', state.isWaiting);
+    if (this.#isReady) this.#message.say('', { isBusy: state.isWaiting });
     const point = state.point && pointText(state.point);
     if (this.#side.open === 'quality' && track.isAutomatic && point !== this.#pointShown) this.#side.fill();
     this.#pointShown = point;
@@ -377,27 +394,12 @@ export class SplatPlayer extends HTMLElement {
 
   #fail(message) {
     if (this.#isReady) this.#losses.add([message], null);
-    else {
-      this.#say(`This cannot be played: ${message}`);
-      this.#find('open').hidden = false;
-    }
+    else this.#message.say(`This cannot be played: ${message}`, { isOpen: true });
     this.#emit('failed', { message });
   }
 
   #emit(type, detail) {
     this.dispatchEvent(new CustomEvent(type, { detail }));
-  }
-
-  #say(text, isBusy = false) {
-    this.#find('said').textContent = text;
-    this.#find('ring').hidden = !isBusy;
-    this.#find('open').hidden = true;
-    this.#find('message').hidden = !text && !isBusy;
-  }
-
-  #invite() {
-    this.#say('Drop a stream here, or choose one. It stays on this device.');
-    this.#find('open').hidden = false;
   }
 
   #moved() {
@@ -487,6 +489,8 @@ export class SplatPlayer extends HTMLElement {
     this.#stage.invalidate();
   }
 }
+
+reflect(SplatPlayer);
 
 /** Presses a toggle; whether it is on then. */
 function flip(key) {

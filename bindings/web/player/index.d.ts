@@ -22,13 +22,23 @@ export interface FixedCamera {
 export class SplatPlayer extends HTMLElement {
   /** The decoder's module or its bytes, for pages without its file. */
   module: WebAssembly.Module | Uint8Array | null;
+  /** The attribute: an address, which may be relative to the page; empty if there is none. To set another one opens it. */
+  src: string;
+  /** False: `autoplay="no"`. */
+  autoplay: boolean;
+  /** False: `controls="none"`. */
+  controls: boolean;
+  /** The attribute: `full`, or empty. */
+  resolution: 'full' | '';
+  /** The attribute: `light`, `dark`, or empty. */
+  theme: 'light' | 'dark' | '';
   /** Makes a worker, for pages without its file. */
   startWorker: (() => Worker) | undefined;
   readonly frame: Frame | null;
   readonly description: Description | null;
   readonly losses: string[];
   readonly isPlaying: boolean;
-  /** Null: what the network allows, of a package. */
+  /** Null: what the network allows, of a package. To be set before a source is opened, too; the attribute `operating-point` is not changed. */
   operatingPoint: OperatingPoint | null;
   /** A camera in place of the viewer's; null gives it back. */
   set camera(camera: FixedCamera | null);

@@ -5,4 +5,5 @@ export { Renderer, Scene } from './renderer.js';
 export { Controls } from './controls.js';
 export { framing } from './framing.js';
 
-if (!customElements.get('splat-player')) customElements.define('splat-player', SplatPlayer);
+// Servers that render pages have no elements.
+if (globalThis.customElements && !customElements.get('splat-player')) customElements.define('splat-player', SplatPlayer);

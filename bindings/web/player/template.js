@@ -42,7 +42,7 @@ export const TEMPLATE = `
     ${key('info', 'Figures (I)', 'info', 'aria-expanded="false" aria-controls="side"')}
     ${toggle('fly', 'Fly instead of orbit (F)', 'fly', false, 'class="wide"')}
     ${key('home', 'Reset the view (R)', 'home')}
-    ${key('full', 'Full screen', 'full', document.fullscreenEnabled ? '' : 'hidden')}
+    ${key('full', 'Full screen', 'full')}
   </div>
 </div>
 <div class="side" id="side"></div>

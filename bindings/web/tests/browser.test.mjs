@@ -10,10 +10,15 @@ import { serve } from './server.mjs';
 import { FRAMES, POINTS, at, damaged, nativeDigests, pointOf, splatstream, stream, streamPath, writeCameras } from './setting.mjs';
 
 const SIZE = { width: 480, height: 270 };
+/** A page that sets a property of an element before there is a class for it. */
+const EARLY = `<!doctype html><meta charset="utf-8"><title>Early</title><link rel="icon" href="data:,">
+<script type="importmap">{ "imports": { "@splatstream/decoder": "/decoder/index.js" } }</script>
+<splat-player autoplay="no" style="height: 200px"></splat-player><script>document.querySelector('splat-player').src = '/scene.gss';</script>
+<script type="module" src="/player/index.js"></script>`;
 let server, browser;
 
 before(async () => {
-  server = await serve({ '/scene.gss': stream, '/damaged.gss': Buffer.from(damaged()) });
+  server = await serve({ '/scene.gss': stream, '/damaged.gss': Buffer.from(damaged()), '/early.html': EARLY });
   browser = await launch();
 });
 
@@ -102,6 +107,44 @@ test('an ArrayBuffer is played, and a Blob is refused while what is there stays'
   });
   assert.equal(found.same, true);
   for (const line of found.refused) assert.match(line, /^TypeError: .*not Blob: give await blob\.arrayBuffer\(\)/);
+  await page.finish();
+});
+
+test('attributes are properties, before the element is known as well', async () => {
+  const page = await browser.openPage(server.url, { viewport: SIZE, colorScheme: 'light' });
+  const found = await page.evaluate(async () => {
+    const fresh = document.createElement('splat-player');
+    const ready = () => new Promise((resolve) => fresh.addEventListener('ready', resolve, { once: true }));
+    Object.assign(fresh, { src: 'scene.gss', autoplay: false, controls: false, operatingPoint: { spatial: 0, temporal: 0, refinement: 0 } });
+    const attributes = fresh.getAttributeNames().sort().map((name) => `${name}=${fresh.getAttribute(name)}`);
+    document.body.append(fresh);
+    await ready();
+    const bar = fresh.shadowRoot.getElementById('bar');
+    const first = [fresh.frame.point.refinement, fresh.isPlaying, bar.hidden];
+    const again = ready();
+    fresh.src = new URL('/scene.gss?again', location).href;
+    await again;
+    fresh.controls = true;
+    fresh.setAttribute('operating-point', 's0,t0,r1');
+    const { point } = await fresh.seek(2);
+    const second = [point.refinement, bar.hidden, fresh.getAttribute('controls')];
+    const ground = () => getComputedStyle(fresh).backgroundColor;
+    const light = ground();
+    fresh.theme = 'dark';
+    const dark = ground();
+    fresh.theme = null;
+    return { attributes, first, second, themes: [light !== dark, light === ground(), fresh.theme] };
+  });
+  assert.deepEqual(found, {
+    attributes: ['autoplay=no', 'controls=none', 'src=scene.gss'],
+    first: [0, false, true],
+    second: [1, false, null],
+    themes: [true, true, ''],
+  });
+  // The page knows the element only after its properties were set.
+  await page.goto(server.url.replace(/\/$/, '/early.html'));
+  await page.waitForFunction(() => document.querySelector('splat-player').frame);
+  assert.equal(await page.evaluate(() => document.querySelector('splat-player').getAttribute('src')), '/scene.gss');
   await page.finish();
 });
 

@@ -1,8 +1,11 @@
 // The decoder in Node: node --test node.test.mjs, with the variables of setting.mjs.
 import assert from 'node:assert/strict';
+import { execFileSync } from 'node:child_process';
+import { cpSync, rmSync } from 'node:fs';
 import test from 'node:test';
+import { fileURLToPath } from 'node:url';
 import { Decoder, DecoderWorker, hasSimd } from '../decoder/index.js';
-import { FRAMES, POINTS, damaged, nativeDigests, pointOf, stream } from './setting.mjs';
+import { FRAMES, POINTS, at, damaged, nativeDigests, pointOf, stream } from './setting.mjs';
 
 /** Decodes to the end; gives the digest of every frame, and calls `each` with the decoder and the frame. */
 function digests(decoder, each = () => {}) {
@@ -140,6 +143,36 @@ test('the description says what the stream holds', async () => {
   const { frames, frameSeconds, highest, upAxis } = decoder.describe();
   assert.deepEqual([frames, highest, upAxis], [FRAMES, { spatial: 1, temporal: 1, refinement: 2 }, '-y']);
   assert.ok(Math.abs(frameSeconds - 1 / 30) < 1e-6);
+});
+
+test('all rows are those that the updates have brought, one after the other', async () => {
+  const decoder = await opened();
+  assert.equal(decoder.whole(), null);
+  let [base, sh] = [null, null];
+  const write = (texture, runs) => {
+    for (const { row, rows, words } of runs) texture.set(words, (row * words.length) / rows);
+  };
+  digests(decoder, () => {
+    const update = decoder.show();
+    if (update.isNew) [base, sh] = [update.base, update.sh].map(([all]) => new Uint32Array(all?.words.length ?? 0));
+    write(base, update.base);
+    write(sh, update.sh);
+  });
+  const whole = decoder.whole();
+  assert.deepEqual([whole.isNew, whole.base.length, whole.base[0].row, whole.base[0].rows], [true, 1, 0, whole.slots / 512]);
+  assert.deepEqual(whole.base[0].words, base);
+  assert.deepEqual(whole.sh[0]?.words ?? new Uint32Array(0), sh);
+});
+
+test('a server that renders pages can import the player', () => {
+  const installed = at('installed');
+  rmSync(installed, { recursive: true, force: true });
+  for (const name of ['decoder', 'player']) {
+    cpSync(fileURLToPath(new URL(`../${name}`, import.meta.url)), at('installed', 'node_modules', '@splatstream', name), { recursive: true });
+  }
+  const program = "import { SplatPlayer, Renderer } from '@splatstream/player'; console.log(SplatPlayer.name, Renderer.name, typeof document);";
+  const said = execFileSync(process.execPath, ['--input-type=module', '--eval', program], { cwd: installed, encoding: 'utf8' });
+  assert.equal(said.trim(), 'SplatPlayer Renderer undefined');
 });
 
 test('this engine takes the module with SIMD', () => assert.ok(hasSimd()));

@@ -37,6 +37,9 @@ export function stream(url: string): () => number {
 
 /** The element. */
 export async function last(player: SplatPlayer): Promise<string | null> {
+  player.src = 'talk.gss';
+  player.controls = false;
+  player.theme = 'dark';
   player.operatingPoint = { refinement: 0 };
   player.operatingPoint = (player.statistics.package?.stalls ?? 0) > 0 ? { spatial: 0 } : null;
   const frame = await player.seek((player.description?.frames ?? 1) - 1);
