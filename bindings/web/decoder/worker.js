@@ -120,7 +120,8 @@ class Player {
   setPoint(point) {
     this.#point = point;
     this.#decoder.setPoint(point);
-    this.#until = Infinity;
+    // Before the first frame there is none to go back for, and a presentation that grows starts near its end.
+    if (this.#shown >= 0) this.#until = Infinity;
   }
 
   #seek(index) {
