@@ -93,7 +93,13 @@ fn upright() -> Vec<u8> {
     let unit = units.find(|unit| unit.header.unit_type() == UnitType::SceneDescription).unwrap();
     let mut scene = payload::SceneDescription::parse(unit.payload, unit.payload_at).unwrap();
     scene.up_axis = payload::UpAxis::MinusZ;
-    let id = UnitId { unit_type: UnitType::SceneDescription, spatial_layer: 0, temporal_layer: 0, refinement: 0, frame: 0 };
+    let id = UnitId {
+        unit_type: UnitType::SceneDescription,
+        spatial_layer: 0,
+        temporal_layer: 0,
+        refinement: 0,
+        frame: 0,
+    };
     let mut stream = STREAM[..usize::try_from(unit.at).unwrap()].to_vec();
     write_unit(&mut stream, id, &scene.to_bytes().unwrap()).unwrap();
     // Offsets of the index hold: the unit is as long as before.
