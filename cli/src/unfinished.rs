@@ -26,6 +26,9 @@ static STATE: Mutex<State> = Mutex::new(State {
     tell: None,
 });
 
+/// Says how a command failed.
+type Teller = Box<dyn Fn(&Failure) + Send>;
+
 struct State {
     is_listening: bool,
     /// Files without their final names.
@@ -41,7 +44,7 @@ struct State {
     /// Ends a command that can stop by itself and tell how far it came.
     stop: Option<Box<dyn Fn() + Send>>,
     /// Says that the command was interrupted.
-    tell: Option<Box<dyn Fn(&Failure) + Send>>,
+    tell: Option<Teller>,
 }
 
 /// A file that goes away unless it is given a name.
