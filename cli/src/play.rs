@@ -90,8 +90,10 @@ enum RuleName {
 }
 
 impl RuleName {
-    fn rule(self) -> Box<dyn Rule> {
+    /// The rule, for a package on this machine or on a server.
+    fn rule(self, is_local: bool) -> Box<dyn Rule> {
         match self {
+            Self::Layered if is_local => Box::new(Layered::local()),
             Self::Layered => Box::new(Layered::default()),
             Self::Throughput => Box::new(Single::whole(ThroughputRule)),
             Self::Buffer => Box::new(Single::whole(BufferRule)),
@@ -131,7 +133,7 @@ impl Play {
                     requests: Requests::OfClient(Box::new(client.manifest().clone())),
                     ..Link::new(trace)
                 };
-                let outcome = simulate(&ladder, &self.settings(), self.rule.rule(), &link);
+                let outcome = simulate(&ladder, &self.settings(), self.rule.rule(false), &link);
                 Report::of_simulation(client.manifest(), &ladder, &outcome)
             }
             None => {
@@ -142,7 +144,7 @@ impl Play {
                     }
                     decoding.show(gop);
                 };
-                let outcome = client.play(self.rule.rule(), show).map_err(failed)?;
+                let outcome = client.play(self.rule.rule(client.is_local()), show).map_err(failed)?;
                 Report::of_playback(client.manifest(), &outcome, decoding.finish()?)
             }
         };

@@ -155,6 +155,12 @@ impl Client {
         Ok(Self { source, manifest, tag, options })
     }
 
+    /// Whether the package is in a directory of this machine: [`Layered::local`](crate::control::Layered::local) is the rule for
+    /// those.
+    pub fn is_local(&self) -> bool {
+        matches!(self.source, Source::Directory(_))
+    }
+
     /// The manifest, as it was read last, with the layers that are fetched.
     pub fn manifest(&self) -> &Manifest {
         &self.manifest

@@ -23,6 +23,7 @@
 mod baselines;
 mod driven;
 mod fetch;
+mod idle;
 pub(crate) mod ladder;
 mod layered;
 mod live;
@@ -32,6 +33,7 @@ mod plan;
 mod rule;
 mod session;
 mod single;
+mod start;
 mod state;
 mod throughput;
 

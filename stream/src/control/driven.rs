@@ -20,6 +20,8 @@ impl<R: Rule> Session<R> {
     /// there, when that has arrived.
     pub fn go_to(&mut self, now_us: u64, gop: usize) {
         self.advance(now_us);
+        let is_after_last = self.state.current.saturating_add(1) >= self.state.ladder.gops().len();
+        self.state.viewer.loops |= is_after_last && gop == 0 && !self.state.shown.is_empty();
         self.state.current = gop;
         self.state.offset_ns = 0;
         if let Some(excess) = self.state.shown.len().checked_sub(REMEMBERED) {

@@ -1,11 +1,13 @@
 //! The rule for layered streams.
 
 use super::fetch::Fetch;
+use super::idle::is_played_again;
 use super::ladder::{Gop, Levels};
 use super::number::{count, real, seconds};
 use super::options::{Choice, choices, gain};
 use super::plan::{Outlook, best};
 use super::rule::{Decision, Rule};
+use super::start::shortness;
 use super::state::{Playback, Request, State};
 
 /// What the rule goes by. The defaults were tuned on one half of a set of traces and checked on the other.
@@ -52,22 +54,33 @@ impl Default for Weights {
 /// - The next GOP is fetched up to the point that a plan over some GOPs finds best under a cautious prediction of
 ///   throughput, its base first and then by gain of quality per byte. A second of buffer has a price, which follows from
 ///   what the network can sustain and rises as the buffer falls.
-/// - When enough is buffered, GOPs that are there are upgraded, if that gains more than it costs.
+/// - A short presentation starts with more than its base, within a second, where the first measured requests show that this
+///   gains more than the wait costs, and is fetched whole as long as that comes in time.
+/// - When enough is buffered, GOPs that are there are upgraded, if that gains more than it costs; when all is there, in what
+///   time is left, and where a short presentation may be played again, those that were played too.
 /// - A request is given up when the base of the next GOP would come too late because of it; what has arrived of it is
 ///   played.
 /// - Live, playback runs a little faster or slower towards the latency that is aimed at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Layered {
-    weights: Weights,
+    pub(super) weights: Weights,
+    /// Whether nothing but files is between.
+    is_local: bool,
 }
 
 impl Layered {
     /// The rule with other weights.
     pub fn new(weights: Weights) -> Self {
-        Self { weights }
+        Self { weights, is_local: false }
     }
 
-    fn outlook(&self, state: &State) -> Outlook {
+    /// The rule for a package on this machine: there is no network whose time would have to be shared out, so every GOP is
+    /// played at the best point that the device can take.
+    pub fn local() -> Self {
+        Self { is_local: true, ..Self::default() }
+    }
+
+    pub(super) fn outlook(&self, state: &State) -> Outlook {
         let weights = &self.weights;
         let (least, most) =
             super::ladder::quality_range(horizon(state, state.first_missing(), weights.horizon));
@@ -86,7 +99,7 @@ impl Layered {
             full,
             before: state.quality_before(state.first_missing()),
             stall_weight: weights.stall * most.max(1.0),
-            change_weight: weights.change,
+            change_weight: weights.change * shortness(state),
             // Towards its end, what is buffered of a stored presentation loses its worth.
             price: price * (left(state) / full.max(0.1)).min(1.0),
             fear: weights.fear,
@@ -133,7 +146,7 @@ impl Layered {
                 let smoother = changes(now.quality) - changes(option.quality);
                 let better = (option.quality - now.quality) * seconds(gop.duration_us());
                 let cost = outlook.worth(outlook.buffer) - outlook.worth(outlook.buffer - time);
-                let net = (better + smoother * self.weights.change - cost) / time.max(1e-3);
+                let net = (better + smoother * outlook.change_weight - cost) / time.max(1e-3);
                 if net > found.as_ref().map_or(0.0, |best| best.0) {
                     found = Some((net, index, option.levels));
                 }
@@ -145,7 +158,9 @@ impl Layered {
 
     /// The next request, or when to look for one again.
     fn fetch(&self, state: &State) -> Decision {
-        if let Some(fetch) = improvement(state) {
+        let first =
+            improvement(state).or_else(|| self.before_start(state)).or_else(|| self.all_in_time(state));
+        if let Some(fetch) = first {
             return Decision::Fetch(fetch);
         }
         let outlook = self.outlook(state);
@@ -161,16 +176,17 @@ impl Layered {
         } else {
             None
         };
-        let fetch = upgrade.or_else(|| request(state, &outlook, next, &wanted?.levels));
-        let later = Decision::Wait { until_us: state.now_us().saturating_add(TICK_US) };
-        fetch.map_or(later, Decision::Fetch)
+        let fetch = upgrade
+            .or_else(|| request(state, &outlook, next, &wanted?.levels))
+            .or_else(|| self.in_spare_time(state, &outlook));
+        fetch.map_or(later(state), Decision::Fetch)
     }
 
     /// Whether the running request is of no use any more, or stands in the way of the next base: that would come too late
     /// after it, and little more is buffered than that takes.
     fn abandons(&self, state: &State, request: &Request) -> bool {
         let gop = request.fetch.gop();
-        if gop < state.first_open() {
+        if gop < state.first_open() && !is_played_again(state) {
             return true;
         }
         let next = state.first_missing();
@@ -181,7 +197,9 @@ impl Layered {
         let left = request.fetch.bytes().saturating_sub(request.progress.bytes);
         let rate = current_rate(state, request).unwrap_or(self.weights.first_guess);
         let time = |bytes: u64| real(bytes) * 8.0 / rate.max(1.0);
-        let need = (state.network().latency() + time(base) * MARGIN).max(0.5);
+        // Short GOPs come in so quick succession that half a second is several of them.
+        let gop_seconds = state.ladder().gops().get(next).map_or(1.0, |gop| seconds(gop.duration_us()));
+        let need = (state.network().latency() + time(base) * MARGIN).max(0.5 * gop_seconds.min(1.0));
         let buffer = seconds(state.buffer_us()) / state.speed();
         time(left) + need > buffer && left > base && buffer < 4.0 * need
     }
@@ -204,7 +222,7 @@ const STEADY_ERROR: f64 = 0.05;
 const LEISURE: f64 = 0.25;
 
 /// Requests what is missing, in few ranges if there is time.
-fn request(state: &State, outlook: &Outlook, gop: usize, wanted: &Levels) -> Option<Fetch> {
+pub(super) fn request(state: &State, outlook: &Outlook, gop: usize, wanted: &Levels) -> Option<Fetch> {
     let fetch = Fetch::towards(state, gop, wanted)?;
     let until = time_until(state, gop);
     if outlook.time(fetch.bytes()) > LEISURE * until {
@@ -222,6 +240,17 @@ fn time_until(state: &State, gop: usize) -> f64 {
 /// A rule that waits looks again after this time.
 const TICK_US: u64 = 100_000;
 
+fn later(state: &State) -> Decision {
+    Decision::Wait { until_us: state.now_us().saturating_add(TICK_US) }
+}
+
+/// All of the next GOP that the device can take, as soon as there is room for it.
+fn everything(state: &State) -> Option<Fetch> {
+    let next = state.first_missing();
+    let is_due = has_room(state, next) && state.available_us(next) <= state.now_us();
+    Fetch::at_leisure(state, next, &state.choices(next).pop().filter(|_| is_due)?.levels)
+}
+
 /// Whether one more GOP fits in the buffer; it does if nothing is there.
 fn has_room(state: &State, gop: usize) -> bool {
     let duration_us = state.ladder().gops().get(gop).map_or(0, Gop::duration_us);
@@ -237,7 +266,7 @@ fn left(state: &State) -> f64 {
 }
 
 /// The next GOPs from one on.
-fn horizon(state: &State, from: usize, count: usize) -> &[Gop] {
+pub(super) fn horizon(state: &State, from: usize, count: usize) -> &[Gop] {
     let gops = state.ladder().gops();
     let to = from.saturating_add(count.max(1)).min(gops.len());
     gops.get(from.min(to)..to).unwrap_or_default()
@@ -297,10 +326,19 @@ impl Rule for Layered {
         if let Some(milli) = catch_up(state) {
             return Decision::Rate { milli };
         }
-        let Some(request) = state.request() else { return self.fetch(state) };
-        if self.abandons(state, request) {
-            return Decision::Abandon;
+        match state.request() {
+            None if self.is_local => everything(state).map_or(later(state), Decision::Fetch),
+            None => self.fetch(state),
+            Some(request) if !self.is_local && self.abandons(state, request) => Decision::Abandon,
+            Some(_) => later(state),
         }
-        Decision::Wait { until_us: state.now_us().saturating_add(TICK_US) }
+    }
+
+    fn whole_gops(&self) -> bool {
+        self.is_local
+    }
+
+    fn may_start(&self, state: &State) -> bool {
+        self.is_local || !self.holds(state)
     }
 }

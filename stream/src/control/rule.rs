@@ -47,6 +47,12 @@ pub trait Rule {
     fn whole_gops(&self) -> bool {
         false
     }
+
+    /// Whether playback may start in a state in which enough has arrived for it. It starts later where more is to come first.
+    fn may_start(&self, state: &State) -> bool {
+        let _ = state;
+        true
+    }
 }
 
 impl<R: Rule + ?Sized> Rule for Box<R> {
@@ -56,5 +62,9 @@ impl<R: Rule + ?Sized> Rule for Box<R> {
 
     fn whole_gops(&self) -> bool {
         (**self).whole_gops()
+    }
+
+    fn may_start(&self, state: &State) -> bool {
+        (**self).may_start(state)
     }
 }

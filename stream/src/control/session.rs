@@ -48,6 +48,8 @@ impl<R: Rule> Session<R> {
     /// bytes have arrived, and when a GOP has ended ([`State::gop_end_us`]). A request counts as sent when it is returned.
     pub fn decide(&mut self, now_us: u64) -> Decision {
         self.advance(now_us);
+        // A rule that held the start back may do so no longer.
+        self.resume();
         let state = &mut self.state;
         if state.request.is_none() && state.retry_us > state.now_us {
             return Decision::Wait { until_us: state.retry_us };
@@ -187,7 +189,7 @@ impl<R: Rule> Session<R> {
         let still = matches!(state.playback, Playback::Starting | Playback::Stalled);
         let missing = state.first_missing();
         let enough = state.buffer_us() >= state.settings.start_us || missing >= state.ladder.gops().len();
-        if still && missing > state.current && enough {
+        if still && missing > state.current && enough && self.rule.may_start(state) {
             self.show();
         }
     }

@@ -128,6 +128,8 @@ pub(super) struct Viewer {
     pub(super) holds: bool,
     /// The operating point that is wanted, in place of what the rule finds best.
     pub(super) chosen: Option<OperatingPoint>,
+    /// Whether the playhead has gone from the last GOP to the first one.
+    pub(super) loops: bool,
     /// Media time that passes in a second of the clock, in thousandths, apart from [`State::rate_milli`].
     pub(super) speed_milli: u32,
 }
@@ -154,7 +156,7 @@ impl State {
             retry_us: now_us,
             network: Network::default(),
             shown: Vec::new(),
-            viewer: Viewer { drives: false, holds: false, chosen: None, speed_milli: 1000 },
+            viewer: Viewer { drives: false, holds: false, chosen: None, loops: false, speed_milli: 1000 },
         };
         state.grow();
         state
