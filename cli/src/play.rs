@@ -4,7 +4,7 @@ mod decoding;
 mod report;
 
 use crate::console::{Console, to_json};
-use crate::failure::Failure;
+use crate::failure::{Failure, Instead};
 use crate::numbers::counted;
 use crate::output_file::{OutputFile, check_ending, refuse_inputs};
 use crate::package::files_in;
@@ -153,6 +153,11 @@ impl Play {
             OutputFile::write_apart(path, &inputs, to_json(&report)?.as_bytes())?;
         }
         console.report_beside(self.out.as_deref(), &report, || report.text())?;
+        if let Some(error) = report.undecoded() {
+            let level = Some(client.manifest().stream.level);
+            let path = PathBuf::from(&self.location);
+            return Err(Failure::Stream { path, error, instead: Instead::Nothing, level });
+        }
         match report.has_played() {
             true => Ok(()),
             false => Err(Failure::other(format!(

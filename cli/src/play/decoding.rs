@@ -5,6 +5,7 @@ use serde::Serialize;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::process::Options;
 use splatstream_decoder::stream::{Step, StreamDecoder};
+use splatstream_format::{Class, Error};
 use splatstream_stream::client::PlayedGop;
 use std::collections::BTreeMap;
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -21,6 +22,24 @@ pub(super) struct Decoded {
     pub(super) lost: Vec<(u32, u32)>,
     /// What was wrong, in words.
     pub(super) errors: Vec<String>,
+    /// The error that counts most: that of a limit, or else the first one.
+    #[serde(skip)]
+    pub(super) worst: Option<Error>,
+}
+
+impl Decoded {
+    fn add(&mut self, error: Error) {
+        let is_limit = |error: &Error| error.class() == Class::OverLimit;
+        self.errors.push(error.to_string());
+        if self.worst.is_none_or(|worst| is_limit(&error) && !is_limit(&worst)) {
+            self.worst = Some(error);
+        }
+    }
+
+    /// Whether a limit kept something from being decoded.
+    pub(super) fn is_over_limit(&self) -> bool {
+        self.worst.is_some_and(|error| error.class() == Class::OverLimit)
+    }
 }
 
 /// GOPs that wait to be decoded: so the memory is bounded, and a slow decoder holds playback up.
@@ -105,7 +124,7 @@ fn decode(job: &Job, options: &Options) -> Decoded {
             Ok(Step::NeedMoreData(_)) if decoder.position() != at => {}
             Ok(Step::NeedMoreData(_) | Step::End) => break,
             Err(error) => {
-                decoded.errors.push(error.to_string());
+                decoded.add(error);
                 break;
             }
         }
@@ -113,6 +132,8 @@ fn decode(job: &Job, options: &Options) -> Decoded {
     decoded.seconds = start.elapsed().as_secs_f64();
     let summary = decoder.summary();
     decoded.lost = summary.lost.iter().map(|frames| (*frames.start(), *frames.end())).collect();
-    decoded.errors.extend(summary.errors.iter().map(ToString::to_string));
+    for error in &summary.errors {
+        decoded.add(*error);
+    }
     decoded
 }

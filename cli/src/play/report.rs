@@ -3,6 +3,7 @@
 use super::decoding::Decoded;
 use crate::numbers::counted;
 use serde::Serialize;
+use splatstream_format::Error;
 use splatstream_stream::client::{GopLog, Loss, Outcome, PlayedGop};
 use splatstream_stream::control::{Ladder, Shown};
 use splatstream_stream::manifest::Manifest;
@@ -89,7 +90,16 @@ impl Report {
         let rows = outcome.gops.iter();
         let gops = rows.map(|log| GopReport::new(log, decoded.remove(&log.number))).collect();
         let losses = outcome.losses.iter().map(LossReport::from).collect();
-        Self { losses, ..Self::new(manifest, gops, &outcome.report, &outcome.score()) }
+        let mut report = Self { losses, ..Self::new(manifest, gops, &outcome.report, &outcome.score()) };
+        report.totals.complete &= report.gops.iter().all(GopReport::is_seen);
+        report
+    }
+
+    /// Why a limit kept frames from being decoded, or why none could be; nothing if frames were, as far as they arrived.
+    pub(super) fn undecoded(&self) -> Option<Error> {
+        let all = || self.gops.iter().filter_map(|gop| gop.decoded.as_ref());
+        let is_blank = all().all(|decoded| decoded.frames == 0);
+        all().find(|decoded| decoded.is_over_limit() || is_blank)?.worst
     }
 
     /// Of a simulated playback.
@@ -139,23 +149,39 @@ impl Report {
         self.gops.is_empty() || self.played() > 0
     }
 
-    /// GOPs that were played.
+    /// GOPs that were played: those that arrived, and of which something could be decoded.
     fn played(&self) -> usize {
-        self.gops.iter().filter(|gop| gop.op.is_some()).count()
+        self.gops.iter().filter(|gop| gop.op.is_some() && gop.is_seen()).count()
+    }
+
+    /// A line for each loss; those of one kind in GOPs that follow each other share one.
+    fn losses_text(&self) -> String {
+        let is_next = |a: &LossReport, b: &LossReport| {
+            let kind =
+                |loss: &LossReport| (loss.representation.clone(), loss.refinement, loss.reason.clone());
+            a.count == 1 && b.count == 1 && b.gop == a.gop + 1 && kind(a) == kind(b)
+        };
+        let line = |losses: &[LossReport]| {
+            let (first, last) = losses.first().zip(losses.last())?;
+            let LossReport { gop, count, representation, refinement, reason } = first;
+            let end = last.gop + last.count.saturating_sub(1);
+            Some(match (losses.len(), count) {
+                (1, 0 | 1) => format!(
+                    "GOP {gop}: {representation} is left out from refinement {refinement} on: {reason}\n"
+                ),
+                (1, _) => format!("GOPs {gop} to {end} are skipped: {reason}\n"),
+                _ => format!(
+                    "GOPs {gop} to {end}: {representation} is left out from refinement {refinement} on: {reason}\n"
+                ),
+            })
+        };
+        self.losses.chunk_by(is_next).filter_map(line).collect()
     }
 
     pub(super) fn text(&self) -> String {
         let totals = &self.totals;
         let mut text = String::new();
-        for loss in &self.losses {
-            let LossReport { gop, count, representation, refinement, reason } = loss;
-            text += &match count {
-                0 | 1 => format!(
-                    "GOP {gop}: {representation} is left out from refinement {refinement} on: {reason}\n"
-                ),
-                _ => format!("GOPs {gop} to {} are skipped: {reason}\n", gop + count - 1),
-            };
-        }
+        text += &self.losses_text();
         for gop in &self.gops {
             for error in gop.decoded.iter().flat_map(|decoded| &decoded.errors) {
                 text += &format!("GOP {}: {error}\n", gop.gop);
@@ -186,6 +212,11 @@ impl Report {
 }
 
 impl GopReport {
+    /// Whether there were pictures of it, if it was decoded.
+    fn is_seen(&self) -> bool {
+        self.decoded.as_ref().is_none_or(|decoded| decoded.frames > 0)
+    }
+
     fn new(log: &GopLog, decoded: Option<Decoded>) -> Self {
         let of = |value: fn(&Shown) -> f64| log.shown.as_ref().map(value);
         Self {
