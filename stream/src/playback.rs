@@ -58,7 +58,7 @@ mod store;
 use crate::control::number::size;
 use crate::control::{Decision, Fetch, OperatingPoint, Rule, Session, Settings, State};
 use crate::manifest::{GopInfo, Manifest};
-use attempts::Attempts;
+use attempts::{Attempts, Verdict};
 use driven::Viewer;
 use follow::{Follow, leave_out_before};
 use parts::{Kind, Part, parts, requests};
@@ -352,30 +352,63 @@ impl<R: Rule> Player<R> {
     /// The running fetch has failed: its requests end here. What has failed too often is left out.
     pub fn failed(&mut self, now_us: u64, fault: &Fault) {
         let Some(running) = self.running.take() else { return };
-        self.session.failed(now_us);
-        let Some(part) = running.part() else { return };
+        let part = running.part();
+        // Who refuses answers: to ask for something else need not wait.
+        match part.is_some_and(|part| fault.is_final() && !part.is_base()) {
+            true => self.session.refused(now_us),
+            false => self.session.failed(now_us),
+        }
+        let Some(part) = part else { return };
         self.count(part.gop, |log| log.failures = log.failures.saturating_add(1));
         if *fault == Fault::Changed {
             self.renewal = Renewal::Wanted;
         }
-        if self.attempts.are_spent(part, fault, &self.options) {
-            self.leave_out(now_us, part, fault);
+        let info = self.manifest.representations.get(part.representation);
+        let is_shared = info.is_some_and(|info| info.file == part.file) && self.follow.is_none();
+        match self.attempts.judge(part, fault, &self.options, is_shared) {
+            Verdict::Again => {}
+            Verdict::LeftOut => self.leave_out(now_us, part, fault),
+            Verdict::Gone => self.leave_out_everywhere(now_us, part, fault),
         }
     }
 
     fn leave_out(&mut self, now_us: u64, part: &Part, fault: &Fault) {
         self.attempts.left_out(part, fault);
         self.session.unavailable(now_us, part.gop, part.representation, part.piece);
-        let representation =
-            self.manifest.representations.get(part.representation).map(|info| info.id.clone());
         let refinement = match part.kind {
             Kind::Init => 0,
             Kind::Level { level, .. } => level,
         };
+        self.name_loss(part.gop, part.representation, refinement, fault);
+    }
+
+    /// Leaves a Representation out of the GOP of a part, and of all others of which nothing of it has arrived: nobody asks for
+    /// it again, nor waits for it.
+    fn leave_out_everywhere(&mut self, now_us: u64, part: &Part, fault: &Fault) {
+        self.leave_out(now_us, part, fault);
+        self.session.give_up_on(now_us, part.representation);
+        let state = self.session.state();
+        let is_open = |gop: usize| gop >= state.first_open() || self.viewer.is_some();
+        let lacks = |gop: usize| {
+            let pieces =
+                state.ladder().gops().get(gop).map_or(&[][..], |gop| gop.pieces(part.representation));
+            let nothing_has_come =
+                state.arrived(gop).is_some_and(|levels| levels.of(part.representation) == 0);
+            nothing_has_come && pieces.iter().any(|piece| piece.bytes > 0)
+        };
+        let others: Vec<usize> =
+            (0..self.logs.len()).filter(|&gop| gop != part.gop && is_open(gop) && lacks(gop)).collect();
+        for gop in others {
+            self.name_loss(gop, part.representation, 0, fault);
+        }
+    }
+
+    fn name_loss(&mut self, gop: usize, representation: usize, refinement: u8, fault: &Fault) {
+        let id = self.manifest.representations.get(representation).map(|info| info.id.clone());
         self.losses.push(Loss {
-            gop: self.number_of(part.gop),
+            gop: self.number_of(gop),
             count: 1,
-            representation: representation.unwrap_or_default(),
+            representation: id.unwrap_or_default(),
             refinement,
             reason: fault.to_string(),
         });

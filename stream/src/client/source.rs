@@ -14,7 +14,10 @@ use ureq::http::{HeaderMap, Response, StatusCode, header};
 
 impl From<io::Error> for Fault {
     fn from(error: io::Error) -> Self {
-        Self::Failed(error.to_string())
+        match error.kind() {
+            io::ErrorKind::NotFound => Self::Missing(error.to_string()),
+            _ => Self::Failed(error.to_string()),
+        }
     }
 }
 

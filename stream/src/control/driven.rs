@@ -70,8 +70,9 @@ impl<R: Rule> Session<R> {
 
     /// What could not be had of a GOP is tried again.
     pub fn retry(&mut self, gop: usize) {
-        if let Some(available) = self.state.available.get_mut(gop) {
-            *available = Levels::all(self.state.ladder.representations().len());
+        let state = &mut self.state;
+        if let Some((available, arrived)) = state.available.get_mut(gop).zip(state.arrived.get(gop)) {
+            *available = state.obtainable.union(arrived);
         }
         self.state.retry_us = self.state.now_us;
     }

@@ -102,14 +102,36 @@ impl<R: Rule> Session<R> {
     }
 
     /// Says that the running request has failed. What has arrived of it stays, unless the rule plays whole GOPs only. The
-    /// next one waits for 0.1 s, and twice as long after each further failure, up to 3.2 s.
+    /// next one waits for 0.1 s, and twice as long after each further failure of which nothing has arrived, up to 3.2 s.
     pub fn failed(&mut self, now_us: u64) {
         self.advance(now_us);
+        let has_come = self.state.request.as_ref().is_some_and(|request| request.progress.bytes > 0);
         self.end_request(false);
         let state = &mut self.state;
+        if has_come {
+            state.failures = 0;
+        }
         let wait_us = 100_000_u64 << state.failures.min(5);
         state.failures = state.failures.saturating_add(1);
         state.retry_us = state.now_us.saturating_add(wait_us);
+    }
+
+    /// Says that the running request was refused, as a file that is not there is. What has arrived of it stays as after
+    /// [`Session::failed`], and the next one does not wait.
+    pub fn refused(&mut self, now_us: u64) {
+        self.advance(now_us);
+        self.end_request(false);
+    }
+
+    /// Says that nothing more of a Representation can be had, of no GOP that there is or comes. What has arrived of it is played.
+    pub fn give_up_on(&mut self, now_us: u64, representation: usize) {
+        self.advance(now_us);
+        let state = &mut self.state;
+        state.obtainable.lower(representation, 0);
+        for (available, arrived) in state.available.iter_mut().zip(&state.arrived) {
+            available.lower(representation, arrived.of(representation));
+        }
+        self.resume();
     }
 
     /// Says that pieces of a GOP arrived damaged: those of a Representation from a refinement on. They are fetched again where

@@ -103,6 +103,8 @@ pub struct State {
     pub(super) arrived: Vec<Levels>,
     /// The pieces of each GOP that can be had, as far as is known.
     pub(super) available: Vec<Levels>,
+    /// The same for a GOP of which nothing is known yet.
+    pub(super) obtainable: Levels,
     pub(super) fetched: Vec<u64>,
     /// GOPs for which a request has ended as the rule wanted.
     pub(super) settled: Vec<bool>,
@@ -136,8 +138,10 @@ pub(super) struct Viewer {
 
 impl State {
     pub(super) fn new(ladder: Ladder, settings: Settings, now_us: u64, only_whole: bool) -> Self {
+        let obtainable = Levels::all(ladder.representations().len());
         let mut state = Self {
             ladder,
+            obtainable,
             settings,
             now_us,
             playback: Playback::Starting,
@@ -166,7 +170,7 @@ impl State {
     pub(super) fn grow(&mut self) {
         let gops = self.ladder.gops().len();
         self.arrived.resize(gops, Levels::none(self.ladder.representations().len()));
-        self.available.resize(gops, Levels::all(self.ladder.representations().len()));
+        self.available.resize(gops, self.obtainable.clone());
         self.fetched.resize(gops, 0);
         self.settled.resize(gops, false);
         self.skipped.resize(gops, false);

@@ -7,6 +7,8 @@ use std::fmt;
 pub enum Fault {
     /// The server refuses with this status.
     Status(u16),
+    /// There is no such file on this machine, in words.
+    Missing(String),
     /// The connection, the file or time failed, in words.
     Failed(String),
     /// The response ends early, after so many bytes.
@@ -22,7 +24,7 @@ pub enum Fault {
 impl Fault {
     /// Whether asking again is unlikely to help.
     pub const fn is_final(&self) -> bool {
-        matches!(self, Self::Status(401 | 403 | 404 | 410 | 451))
+        matches!(self, Self::Missing(_) | Self::Status(401 | 403 | 404 | 410 | 451))
     }
 }
 
@@ -30,7 +32,7 @@ impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Status(status) => write!(f, "the server answers with status {status}"),
-            Self::Failed(why) => f.write_str(why),
+            Self::Missing(why) | Self::Failed(why) => f.write_str(why),
             Self::Short(bytes) => write!(f, "the response ends after {bytes} bytes"),
             Self::Wrong(what) => f.write_str(what),
             Self::Changed => f.write_str("the file has changed"),

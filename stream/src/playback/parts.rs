@@ -17,6 +17,13 @@ pub(crate) struct Part {
     pub(crate) gap: u64,
 }
 
+impl Part {
+    /// Whether nothing of its GOP can be shown without it.
+    pub(crate) fn is_base(&self) -> bool {
+        self.representation == 0 && self.piece == 0
+    }
+}
+
 /// What a part is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
