@@ -42,7 +42,7 @@ pub struct Score {
     pub latency_seconds: f64,
     /// Megabytes that were received.
     pub megabytes: f64,
-    /// Share of the bytes received that were not played.
+    /// Share of the bytes of media that were received and not played.
     pub unplayed: f64,
     /// sabre's "time average played utility": the mean of ln(bitrate / least bitrate) over all time, stalls included
     /// (Spiteri, Sitaraman, Sparacio, "From Theory to Practice: Improving Bitrate Adaptation in the DASH Reference Player",
@@ -102,7 +102,7 @@ impl Score {
                 .sum::<f64>()
                 / real(size(report.shown.len()).max(1)),
             megabytes: real(report.bytes) / 1e6,
-            unplayed: 1.0 - real(useful.min(report.bytes)) / real(report.bytes.max(1)),
+            unplayed: real(report.media_bytes.saturating_sub(useful)) / real(report.media_bytes.max(1)),
             ..Self::default()
         }
     }

@@ -145,6 +145,7 @@ impl<R: Rule> Run<'_, R> {
             waiting_us: state.waiting_us(),
             ended_us: state.now_us(),
             bytes: sum(|log| log.bytes),
+            media_bytes: state.media_bytes(),
             requests: sum(|log| log.requests),
             abandoned: sum(|log| log.abandoned),
             decisions: self.player.decisions(),

@@ -239,6 +239,12 @@ impl State {
         self.available.get(gop)
     }
 
+    /// Bytes of levels that have arrived, of all GOPs together.
+    pub fn media_bytes(&self) -> u64 {
+        let running = self.request.as_ref().map_or(0, |request| request.progress.bytes);
+        self.fetched.iter().fold(running, |sum, bytes| sum.saturating_add(*bytes))
+    }
+
     /// The first GOP that has not begun: pieces of earlier ones are of no use any more.
     pub fn first_open(&self) -> usize {
         match self.playback {

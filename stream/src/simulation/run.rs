@@ -49,6 +49,8 @@ pub struct Report {
     pub ended_us: u64,
     /// Bytes that arrived.
     pub bytes: u64,
+    /// Those of them that are levels of GOPs: what initialisation segments and the bytes between levels have is no media.
+    pub media_bytes: u64,
     /// Requests that were sent.
     pub requests: u64,
     /// Requests that were given up by the rule.
@@ -91,6 +93,7 @@ pub fn simulate<R: Rule>(ladder: &Ladder, settings: &Settings, rule: R, link: &L
             waiting_us: 0,
             ended_us: 0,
             bytes: 0,
+            media_bytes: 0,
             requests: 0,
             abandoned: 0,
             decisions: 0,
@@ -104,6 +107,7 @@ pub fn simulate<R: Rule>(ladder: &Ladder, settings: &Settings, rule: R, link: &L
     let mut report = run.report;
     report.shown = run.session.state().shown().to_vec();
     report.complete = run.session.state().playback() == Playback::Ended;
+    report.media_bytes = run.session.state().media_bytes();
     report.waiting_us = run.session.state().waiting_us();
     report.ended_us = run.now_us;
     report
