@@ -11,13 +11,14 @@ use serde::Serialize;
 use splatstream_chart::numbers::grouped;
 use splatstream_stream::manifest::Manifest;
 use splatstream_stream::package::Package;
-use splatstream_stream::unpackage::unpackage;
+use splatstream_stream::unpackage::{unpackage, unpackage_growing};
 use std::path::{Path, PathBuf};
 
 /// Write the stream that a package was made of, byte for byte.
 #[derive(Args)]
 #[command(after_help = "Example:\n  splatstream unpackage talk/ -o talk.gss\n\n\
-    Reads every .mp4 and .m4s file of the directory. A manifest beside them is used to check the result.")]
+    Reads every .mp4 and .m4s file of the directory. A manifest beside them is used to check the result.\n    \
+    Of a live package that has not ended, the GOPs that are complete are written, with an end made for them.")]
 pub(crate) struct Unpackage {
     /// The directory of the package.
     #[arg(value_name = "DIR")]
@@ -40,6 +41,8 @@ struct Report<'a> {
     files: usize,
     /// Whether a manifest says that these are the bytes that were packaged.
     verified: bool,
+    /// Whether it is all of the stream: a live package has ended.
+    complete: bool,
 }
 
 impl Unpackage {
@@ -47,9 +50,16 @@ impl Unpackage {
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         console.claim(Some(&self.out))?;
         check_stream_name(&self.out)?;
-        let paths = self.media()?;
+        let mut paths = self.media()?;
         let manifest = self.manifest()?;
         self.check_complete(&paths, manifest.as_ref())?;
+        let growing = manifest.as_ref().filter(|manifest| manifest.is_growing());
+        match growing {
+            // What comes after the complete GOPs is still being written.
+            Some(manifest) => paths.retain(|path| is_complete(path, manifest)),
+            None => self.check_ended(&paths)?,
+        }
+        let complete = growing.is_none();
         let mut files: Vec<(String, Vec<u8>)> = Vec::new();
         for path in &paths {
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
@@ -60,16 +70,23 @@ impl Unpackage {
             }
         }
         let given: Vec<_> = files.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
-        let stream = unpackage(&given, &self.limits.limits());
+        let put_together = if complete { unpackage } else { unpackage_growing };
+        let stream = put_together(&given, &self.limits.limits());
         let stream = stream.map_err(|error| {
             let path = self.directory.join(&error.file);
             Failure::stream(if path.exists() { &path } else { &self.directory }, error.error)
         })?;
-        let verified = self.verify(&stream, manifest)?;
+        let verified = self.verify(&stream, manifest.filter(|_| complete))?;
         let inputs = [paths.as_slice(), &[self.directory.join(Package::MANIFEST)]].concat();
         OutputFile::write_apart(&self.out, &inputs, &stream)?;
         let bytes = stream.len() as u64;
-        let report = Report { output: &self.out, bytes, files: paths.len(), verified };
+        let report = Report { output: &self.out, bytes, files: paths.len(), verified, complete };
+        if !complete {
+            console.complain(&format!(
+                "warning: {}: the package is live and has not ended, so the stream is not complete; unpackage it again at its end",
+                self.directory.display()
+            ));
+        }
         console.report_beside(Some(&self.out), &report, || report.text())
     }
 
@@ -121,6 +138,19 @@ impl Unpackage {
         }
     }
 
+    /// Whether a live package, whose manifest does not say that it grows, has its last file.
+    fn check_ended(&self, paths: &[PathBuf]) -> Result<(), Failure> {
+        let has = |name: &str| paths.iter().any(|path| path.file_name().is_some_and(|own| own == name));
+        if !has("s0-init.mp4") || has("s0-end.m4s") {
+            return Ok(());
+        }
+        Err(Failure::other(format!(
+            "{}: the file is missing: the package is live and has not ended, or was not copied whole\n  \
+             unpackage it when it has ended, or with the manifest that was written with its last GOP",
+            self.directory.join("s0-end.m4s").display()
+        )))
+    }
+
     /// Whether there is a manifest; a stream that is not the one it describes is refused.
     fn verify(&self, stream: &[u8], manifest: Option<Manifest>) -> Result<bool, Failure> {
         let Some(manifest) = manifest else { return Ok(false) };
@@ -132,6 +162,12 @@ impl Unpackage {
         }
         Ok(true)
     }
+}
+
+/// Whether a file of a live package begins a Representation or has one of the complete GOPs, which are counted from 1.
+fn is_complete(path: &Path, manifest: &Manifest) -> bool {
+    let gops = manifest.first_gop().saturating_add(manifest.complete_gops() as u64);
+    part_of(path).is_some_and(|(_, number)| number <= gops)
 }
 
 /// The files with media that a manifest names.
@@ -157,7 +193,11 @@ fn part_of(path: &Path) -> Option<(String, u64)> {
 
 impl Report<'_> {
     fn text(&self) -> String {
-        let verified = if self.verified { ", as the manifest has them" } else { "" };
+        let verified = match (self.verified, self.complete) {
+            (true, _) => ", as the manifest has them",
+            (false, true) => "",
+            (false, false) => ", up to the last complete GOP",
+        };
         let (bytes, files) = (counted(self.bytes, "byte"), counted(self.files as u64, "file"));
         format!("{}: {bytes} from {files}{verified}\n", self.output.display())
     }

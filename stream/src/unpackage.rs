@@ -1,4 +1,5 @@
-//! C.10: the files of a package become the stream again, byte for byte.
+//! C.10: the files of a package become the stream again, byte for byte; those of a package that has not ended, a stream of what
+//! is there.
 
 pub(crate) mod file;
 
@@ -6,7 +7,8 @@ use crate::division::{Division, Piece};
 use crate::representation::Representation;
 use core::fmt;
 use file::Media;
-use splatstream_format::syntax::SequenceParameters;
+use splatstream_format::syntax::{EndOfStream, SequenceParameters, UnitHeader, UnitId, UnitType};
+use splatstream_format::unit::Stream;
 use splatstream_format::{Error, ErrorKind, Limits};
 
 /// What is wrong with a file of a package.
@@ -32,13 +34,27 @@ impl std::error::Error for FileError {}
 /// Files that are damaged, incomplete or not those of one package; and one whose samples are not divided as clause C.3
 /// says: nothing else than that stream would have given this package.
 pub fn unpackage(files: &[(String, &[u8])], limits: &Limits) -> Result<Vec<u8>, FileError> {
+    put_together(files, limits, true)
+}
+
+/// The stream of the GOPs of a live package that has not ended, with an end unit that is made for it as clause 7.11 makes those
+/// of extracted streams. `files` have complete GOPs only.
+///
+/// # Errors
+/// As [`unpackage`], and a package that has ended.
+pub fn unpackage_growing(files: &[(String, &[u8])], limits: &Limits) -> Result<Vec<u8>, FileError> {
+    put_together(files, limits, false)
+}
+
+/// The stream in some files, which have its end or do not.
+fn put_together(files: &[(String, &[u8])], limits: &Limits, has_ended: bool) -> Result<Vec<u8>, FileError> {
     let mut media = Vec::new();
     for (name, bytes) in files {
         let parsed = Media::parse(bytes).map_err(|error| FileError { file: name.clone(), error })?;
         media.push((name.as_str(), parsed));
     }
     media.sort_by_key(|(_, one)| one.representation);
-    let base = check_set(&media)?;
+    let base = check_set(&media, has_ended)?;
     let mut samples = Vec::new();
     for (name, one) in &media {
         let in_file = |error| FileError { file: (*name).to_owned(), error };
@@ -52,11 +68,36 @@ pub fn unpackage(files: &[(String, &[u8])], limits: &Limits) -> Result<Vec<u8>, 
         stream.extend_from_slice(part.bytes);
     }
     stream.extend_from_slice(base.tail);
-    let whole = Division::of(&stream, limits);
-    let whole = whole.map_err(|error| FileError { file: "the stream in the package".to_owned(), error })?;
+    let in_stream = |error| FileError { file: "the stream in the package".to_owned(), error };
+    if !has_ended {
+        let end = end_of(&stream, limits).map_err(in_stream)?;
+        stream.extend(end);
+    }
+    let whole = Division::of(&stream, limits).map_err(in_stream)?;
     let pieces = whole.gops.iter().flat_map(|gop| &gop.pieces);
     check_division(pieces, &samples)?;
     Ok(stream)
+}
+
+/// The end unit of a stream without one: it counts frames and units, and knows no index, since those that a stream may have
+/// come after its last GOP.
+fn end_of(stream: &[u8], limits: &Limits) -> splatstream_format::Result<Vec<u8>> {
+    let mut end = EndOfStream { frame_count: 0, unit_count: 0, index_offset: 0 };
+    let mut units = Stream::open(stream, limits)?.units();
+    let whole = u64::try_from(stream.len()).unwrap_or(u64::MAX);
+    while let Some(unit) = units.next_unit() {
+        let unit = match unit {
+            // What is missed there is the unit that is made here.
+            Err(error) if error.at == whole => break,
+            unit => unit?,
+        };
+        let is_frame = unit.header.unit_type() == UnitType::FrameHeader;
+        end.frame_count = end.frame_count.saturating_add(u32::from(is_frame));
+        end.unit_count = end.unit_count.saturating_add(1);
+    }
+    let payload = end.to_bytes()?;
+    let header = UnitHeader::new(UnitId::stream(UnitType::End), &payload)?;
+    Ok([header.to_bytes()?.to_vec(), payload.to_vec()].concat())
 }
 
 /// What the base Representation carries for all.
@@ -67,7 +108,7 @@ struct Base<'a> {
 }
 
 /// The files are those of one package, as far as their heads can tell.
-fn check_set<'a>(media: &[(&str, Media<'a>)]) -> Result<Base<'a>, FileError> {
+fn check_set<'a>(media: &[(&str, Media<'a>)], has_ended: bool) -> Result<Base<'a>, FileError> {
     let none = FileError {
         file: "the package".to_owned(),
         error: Error::new(
@@ -93,8 +134,12 @@ fn check_set<'a>(media: &[(&str, Media<'a>)]) -> Result<Base<'a>, FileError> {
         if one.head != base.head {
             return refused(name, one.head_at, "C.4.2", "the units in gssC are those of Representation s0");
         }
-        if one.tail.is_some() != (before.is_none()) {
-            return refused(name, 0, "C.6", "Representation s0 has gssT, and no other has");
+        if one.tail.is_some() != (before.is_none() && has_ended) {
+            let rule = match has_ended {
+                true => "Representation s0 has gssT, and no other has",
+                false => "a package that has not ended has no gssT",
+            };
+            return refused(name, 0, "C.6", rule);
         }
         before = Some(one.representation);
     }

@@ -11,11 +11,14 @@ use roxmltree::Document;
 use serde_json::Value;
 use splatstream_format::Limits;
 use splatstream_format::arbitrary_stream::ArbitraryStream;
+use splatstream_format::syntax::UnitType;
+use splatstream_format::unit::Stream;
 use splatstream_stream::Representation;
+use splatstream_stream::division::Division;
 use splatstream_stream::live::{Change, Live, Settings};
 use splatstream_stream::manifest::{ByteRange, LiveInfo, Manifest};
 use splatstream_stream::package::{Layout, Options, Package};
-use splatstream_stream::unpackage::unpackage;
+use splatstream_stream::unpackage::{unpackage, unpackage_growing};
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
@@ -175,6 +178,36 @@ fn every_conforming_vector_comes_back_from_its_segments() {
             comes_back(&stream, layout, 1000);
         }
     }
+}
+
+#[test]
+fn complete_gops_of_a_package_that_has_not_ended_are_a_stream() {
+    let path = vectors().into_iter().find(|path| path.to_string_lossy().contains("temporal-gops-mixed"));
+    let stream = std::fs::read(path.unwrap()).unwrap();
+    let whole = Division::of(&stream, &Limits::default()).unwrap();
+    for count in 1..whole.gops.len() {
+        // The GOP after it has begun, so that it is complete.
+        let end = whole.gops[count].start as usize;
+        let mut live = Live::new(&settings(Layout::Gop), &Limits::default());
+        let mut directory = Directory::default();
+        directory.apply(live.push(&stream[..end + 64], START).unwrap());
+        let complete = directory.manifests.last().unwrap().complete_gops();
+        directory.files.retain(|name, _| !name.ends_with(&format!("-{}.m4s", complete + 1)));
+        let media = directory.media();
+        let given: Vec<_> = media.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+        let part = unpackage_growing(&given, &Limits::default()).unwrap();
+        let divided = Division::of(&part, &Limits::default()).unwrap();
+        assert_eq!((complete, divided.gops.len()), (count, count));
+        assert!(part[..end] == stream[..end]);
+        let units = Stream::open(&part, &Limits::default()).unwrap().units();
+        let kinds: Vec<UnitType> = units.map(|unit| unit.unwrap().header.unit_type()).collect();
+        assert_eq!(kinds.last(), Some(&UnitType::End));
+        // One that has ended is not taken for one that has not, nor the other way round.
+        assert!(unpackage(&given, &Limits::default()).is_err());
+    }
+    let media = live(&stream, Layout::Gop, 1000).media();
+    let given: Vec<_> = media.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+    assert!(unpackage_growing(&given, &Limits::default()).is_err());
 }
 
 // covers: SS-CR-028, SS-CR-029

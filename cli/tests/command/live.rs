@@ -168,3 +168,33 @@ fn a_presentation_that_stops_is_an_error() {
     drop(stdin);
     assert_eq!(packager.wait().unwrap().code(), Some(14));
 }
+
+#[test]
+fn a_package_that_has_not_ended_gives_a_stream_of_what_is_there() {
+    for layout in ["gop", "frame"] {
+        let directory = common::directory();
+        let (pieces, out) = (pieces(), directory.path().join("live"));
+        let mut packager = program(&["package", "-", "-o", text(&out), "--live", "--layout", layout])
+            .stdin(Stdio::piped())
+            .spawn()
+            .unwrap();
+        packager.stdin.take().unwrap().write_all(&pieces[..3].concat()).unwrap();
+        assert_eq!(packager.wait().unwrap().code(), Some(14));
+        let back = directory.path().join("back.gss");
+        let output = common::run(&["unpackage", text(&out), "-o", text(&back), "--json"]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && said.contains("has not ended"), "{said}");
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!((&report["complete"], &report["verified"]), (&false.into(), &false.into()));
+        // What is there are the first GOPs, and an end.
+        let bytes = fs::read(&back).unwrap();
+        let gops = Division::of(&bytes, &Limits::default()).unwrap().gops;
+        let end = gops.last().unwrap().pieces.last().unwrap().end as usize;
+        assert!((2..=3).contains(&gops.len()) && bytes[..end] == stream()[..end] && bytes.len() > end);
+        assert!(bytes != stream()[..bytes.len()]);
+        // Without the manifest nobody knows which GOPs are complete.
+        fs::remove_file(out.join("manifest.json")).unwrap();
+        let said = common::fail(1, &["unpackage", text(&out), "-o", text(&back)]);
+        assert!(said.contains("s0-end.m4s") && said.contains("live and has not ended"), "{said}");
+    }
+}
