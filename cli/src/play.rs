@@ -32,7 +32,7 @@ use std::path::{Path, PathBuf};
     splatstream play talk/ --trace mobile.csv --rule bola -o bola.json\n\n\
     A trace is CSV: a line of titles, then a time in seconds and the Mbit/s from then on.")]
 pub(crate) struct Play {
-    /// The package: the URL of its directory or of its manifest.json, or a directory.
+    /// The package: the URL of its directory, of its manifest.json or of its .mpd, or a directory.
     #[arg(value_name = "URL_OR_DIR")]
     location: String,
     /// Who decides what is fetched.
@@ -75,6 +75,9 @@ pub(crate) struct Play {
     #[command(flatten)]
     limits: LimitArgs,
 }
+
+/// What to do about an address that is taken for a path.
+const SCHEME: &str = "\n  if it is on a server, write http:// or https:// before it";
 
 /// Who decides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -122,7 +125,10 @@ impl Play {
             check_ending(out, "json", "a report in JSON")?;
         }
         let trace = self.trace.as_deref().map(|path| self.read_trace(path)).transpose()?;
-        let failed = |error| Failure::other(format!("{}: cannot play: {error}", self.location));
+        let failed = |error| {
+            let advice = if self.lacks_scheme() { SCHEME } else { "" };
+            Failure::other(format!("{}: cannot play: {error}{advice}", self.location))
+        };
         let mut client = Client::open(&self.location, self.options()).map_err(failed)?;
         self.warn_of_large_points(client.manifest(), console);
         let report = match trace {
@@ -179,6 +185,17 @@ impl Play {
                 counted(largest, "Gaussian")
             ));
         }
+    }
+
+    /// Whether the location, which is no path here, looks like the address of a server: a host with a port, or a name with dots,
+    /// before what is on it.
+    fn lacks_scheme(&self) -> bool {
+        let host = self.location.split('/').next().unwrap_or_default();
+        let (name, port) = host.rsplit_once(':').map_or((host, None), |(name, port)| (name, Some(port)));
+        let is_host = port.is_some_and(|port| port.parse::<u16>().is_ok())
+            || name == "localhost"
+            || name.split('.').filter(|label| !label.is_empty()).count() > 1;
+        is_host && !name.is_empty() && !Path::new(&self.location).exists()
     }
 
     /// The files that it reads: a trace, and those of a package on this machine.

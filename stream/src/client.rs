@@ -144,8 +144,8 @@ pub struct Client {
 }
 
 impl Client {
-    /// Reads the manifest of a package: at the URL of its `manifest.json` or of its directory, or in a directory of this
-    /// machine.
+    /// Reads the manifest of a package: at the URL of its `manifest.json`, of its MPD or of its directory, or in a directory of
+    /// this machine.
     ///
     /// # Errors
     /// A manifest that cannot be had or is refused.

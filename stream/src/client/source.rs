@@ -5,6 +5,7 @@ use crate::manifest::digest_of;
 use crate::package::Package;
 use crate::playback::Fault;
 use std::collections::HashMap;
+use std::ffi::OsStr;
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::PathBuf;
@@ -27,6 +28,9 @@ impl From<ureq::Error> for Fault {
     }
 }
 
+/// How the name of an MPD ends, which is beside the manifest.
+const MPD: &[u8] = b".mpd";
+
 /// Bytes of a file and its version, or nothing.
 pub(super) type Whole = Option<(Vec<u8>, Option<String>)>;
 
@@ -45,8 +49,10 @@ impl Source {
             return Self::Server(Server::new(location, options));
         }
         let path = PathBuf::from(location);
-        let is_manifest = path.file_name().is_some_and(|name| name == Package::MANIFEST);
-        Self::Directory(if is_manifest { path.parent().map(PathBuf::from).unwrap_or_default() } else { path })
+        let is_description =
+            |name: &OsStr| name == Package::MANIFEST || name.as_encoded_bytes().ends_with(MPD);
+        let is_file = path.file_name().is_some_and(is_description) && !path.is_dir();
+        Self::Directory(if is_file { path.parent().map(PathBuf::from).unwrap_or_default() } else { path })
     }
 
     /// How people call a file.
@@ -116,7 +122,9 @@ impl Server {
     fn new(location: &str, options: &Options) -> Self {
         let location = location.split('#').next().unwrap_or_default();
         let (path, query) = location.find('?').map_or((location, ""), |at| location.split_at(at));
-        let base = path.strip_suffix(Package::MANIFEST).unwrap_or(path).trim_end_matches('/');
+        let folder = path.rsplit_once('/').filter(|(_, name)| name.as_bytes().ends_with(MPD));
+        let folder = folder.map_or_else(|| path.strip_suffix(Package::MANIFEST), |(folder, _)| Some(folder));
+        let base = folder.unwrap_or(path).trim_end_matches('/');
         let config = Agent::config_builder()
             .http_status_as_error(false)
             .max_redirects(options.redirects)
@@ -227,6 +235,8 @@ mod tests {
         assert_eq!(place("http://a/b"), "http://a/b/s0.mp4");
         assert_eq!(place("http://a/b/"), "http://a/b/s0.mp4");
         assert_eq!(place("https://a/b/manifest.json?key=1#x"), "https://a/b/s0.mp4?key=1");
+        assert_eq!(place("http://a/b/manifest.mpd?key=1"), "http://a/b/s0.mp4?key=1");
+        assert_eq!(place("b/manifest.mpd"), PathBuf::from("b").join("s0.mp4").display().to_string());
         assert_eq!(place("b/manifest.json"), PathBuf::from("b").join("s0.mp4").display().to_string());
     }
 }
