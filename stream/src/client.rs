@@ -21,6 +21,7 @@ mod player;
 mod poll;
 mod report;
 mod source;
+mod whole;
 
 use crate::control::Settings;
 use crate::manifest::{Manifest, ManifestError};
@@ -57,7 +58,8 @@ pub struct Options {
     pub attempts: u32,
     /// Requests for the base of a GOP before the GOP is left out.
     pub base_attempts: u32,
-    /// Bytes of the package that are held at the same time.
+    /// Bytes of the package that are held at the same time; as many again of whole files, where a server does not answer
+    /// with ranges of bytes.
     pub memory: u64,
 }
 

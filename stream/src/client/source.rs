@@ -1,6 +1,7 @@
 //! Where a package is: ranges of bytes of its files, from an HTTP server or a directory.
 
 use super::Options;
+use super::whole::{WholeFiles, kept_range};
 use crate::manifest::digest_of;
 use crate::package::Package;
 use crate::playback::Fault;
@@ -10,8 +11,8 @@ use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
-use ureq::Agent;
 use ureq::http::{HeaderMap, Response, StatusCode, header};
+use ureq::{Agent, Body};
 
 impl From<io::Error> for Fault {
     fn from(error: io::Error) -> Self {
@@ -102,6 +103,7 @@ impl Source {
     pub(super) fn forget(&self) {
         if let Self::Server(server) = self {
             server.tags.lock().unwrap_or_else(PoisonError::into_inner).clear();
+            server.files.forget();
         }
     }
 }
@@ -116,6 +118,8 @@ pub(super) struct Server {
     query: String,
     /// `ETag` of each file.
     tags: Arc<Mutex<HashMap<String, String>>>,
+    /// What was sent whole.
+    files: Arc<WholeFiles>,
 }
 
 impl Server {
@@ -141,6 +145,7 @@ impl Server {
             base: format!("{base}/"),
             query: query.to_owned(),
             tags: Arc::default(),
+            files: Arc::new(WholeFiles::new(options.memory)),
         }
     }
 
@@ -168,7 +173,30 @@ impl Server {
         }
     }
 
+    /// A range of a file. A server that has sent a whole file in place of a range is taken to do so with every file.
     fn range(&self, file: &str, offset: u64, size: u64) -> Result<Box<dyn Read + Send>, Fault> {
+        let slot = self.files.is_needed().then(|| self.files.slot(file));
+        let mut held = slot.as_ref().map(|slot| slot.lock().unwrap_or_else(PoisonError::into_inner));
+        if let Some(range) = held.as_ref().and_then(|kept| kept_range(kept, offset, size)) {
+            return Ok(range);
+        }
+        let response = self.answer(file, offset, size)?;
+        let length = response.body().content_length();
+        let is_range = response.status() == StatusCode::PARTIAL_CONTENT;
+        let body = response.into_body().into_reader();
+        match &mut held {
+            _ if is_range => Ok(Box::new(body)),
+            Some(kept) => self.files.keep(kept, body, length, (offset, size)),
+            None => {
+                let slot = self.files.slot(file);
+                let mut kept = slot.lock().unwrap_or_else(PoisonError::into_inner);
+                self.files.keep(&mut kept, body, length, (offset, size))
+            }
+        }
+    }
+
+    /// The response to a request for a range: that range, or the whole file.
+    fn answer(&self, file: &str, offset: u64, size: u64) -> Result<Response<Body>, Fault> {
         let last = offset.saturating_add(size.saturating_sub(1));
         let known = self.tag(file);
         let mut request =
@@ -179,14 +207,14 @@ impl Server {
         }
         let response = request.call()?;
         self.check(file, &response, known.as_deref(), offset, last)?;
-        Ok(Box::new(response.into_body().into_reader()))
+        Ok(response)
     }
 
     fn tag(&self, file: &str) -> Option<String> {
         self.tags.lock().unwrap_or_else(PoisonError::into_inner).get(file).cloned()
     }
 
-    /// Whether a response is the range asked for, of the file that was seen before.
+    /// Whether a response is the range asked for, or the whole file, of the file that was seen before.
     fn check<B>(
         &self,
         file: &str,
@@ -204,7 +232,10 @@ impl Server {
                 return Err(Fault::Changed);
             }
             StatusCode::OK if is_other => return Err(Fault::Changed),
-            StatusCode::OK => return Err(Fault::Wrong("the server does not answer with ranges of bytes")),
+            StatusCode::OK => {
+                self.remember(file, tag);
+                return Ok(());
+            }
             status => return Err(Fault::Status(status.as_u16())),
         }
         let expected = format!("bytes {first}-{last}/");
@@ -213,11 +244,15 @@ impl Server {
         {
             return Err(Fault::Wrong("the server answers with another range of bytes"));
         }
+        self.remember(file, tag);
+        Ok(())
+    }
+
+    fn remember(&self, file: &str, tag: Option<&str>) {
         if let Some(tag) = tag {
             let mut tags = self.tags.lock().unwrap_or_else(PoisonError::into_inner);
             tags.insert(file.to_owned(), tag.to_owned());
         }
-        Ok(())
     }
 }
 
