@@ -133,3 +133,69 @@ fn what_cannot_be_played_at_all_is_an_error() {
     let said = fail(1, &["unpackage", text(&package), "-o", text(&directory.path().join("back.gss"))]);
     assert!(said.contains("s0.mp4: the file is missing"), "{said}");
 }
+
+#[test]
+fn a_package_in_a_directory_is_played_at_its_best() {
+    let directory = directory();
+    let package = package(directory.path(), &["--quality"]);
+    let report = json(&["play", text(&package), "--no-wait"]);
+    for gop in report["gops"].as_array().unwrap() {
+        assert_eq!(gop["quality_db"], 50.0, "{gop}");
+    }
+    let totals = &report["totals"];
+    assert_eq!((&totals["stalls"], &totals["switches"]), (&0.into(), &0.into()));
+    // What describes the files is no media that was not shown.
+    assert_eq!(totals["unplayed_percent"], 0.0);
+}
+
+#[test]
+fn a_layer_whose_file_is_missing_is_asked_for_three_times_and_played_without() {
+    let directory = directory();
+    let package = package(directory.path(), &[]);
+    fs::remove_file(package.join("t0.mp4")).unwrap();
+    let report = json(&["play", text(&package), "--no-wait"]);
+    let gops = report["gops"].as_array().unwrap();
+    let failures: u64 = gops.iter().map(|gop| gop["failures"].as_u64().unwrap()).sum();
+    assert_eq!(failures, 3, "{report:#}");
+    let losses = report["losses"].as_array().unwrap();
+    assert_eq!(losses.len(), 3, "{report:#}");
+    assert!(losses.iter().all(|loss| loss["representation"] == "t0" && loss["count"] == 1));
+    // The rest of every GOP is played at its best.
+    let points: Vec<&Value> = gops.iter().map(|gop| &gop["op"]).collect();
+    assert!(
+        points.iter().all(|op| *op == points[0] && op.as_str().unwrap().starts_with("s1,i,r")),
+        "{points:?}"
+    );
+    assert_eq!((&report["totals"]["complete"], &report["totals"]["stalls"]), (&true.into(), &0.into()));
+    let said = succeed(&["play", text(&package), "--no-wait"]);
+    assert!(said.contains("GOPs 0 to 2: t0 is left out from refinement 0 on"), "{said}");
+}
+
+#[test]
+fn a_limit_that_keeps_everything_from_being_decoded_is_an_error() {
+    let directory = directory();
+    let package = package(directory.path(), &[]);
+    for (option, value) in [("--max-gaussians", "10"), ("--max-memory", "1M")] {
+        let out = directory.path().join("report.json");
+        let said = fail(13, &["play", text(&package), "--no-wait", option, value, "-o", text(&out)]);
+        assert!(said.contains(option), "{said}");
+        let report: Value = serde_json::from_slice(&fs::read(&out).unwrap()).unwrap();
+        assert_eq!(report["totals"]["complete"], false);
+        assert!(decoded(&report, "frames").iter().all(|frames| **frames == 0));
+    }
+    // Who decodes nothing needs no memory for it.
+    succeed(&["play", text(&package), "--no-wait", "--no-decode", "--max-gaussians", "10"]);
+}
+
+#[test]
+fn an_address_without_its_scheme_is_named() {
+    let directory = directory();
+    let package = package(directory.path(), &[]);
+    for address in ["127.0.0.1:8080/x/", "localhost/x/", "example.org/talk/manifest.mpd"] {
+        let said = fail(1, &["play", address, "--no-wait"]);
+        assert!(said.contains("write http:// or https:// before it"), "{said}");
+    }
+    let said = fail(1, &["play", text(&directory.path().join("none")), "--no-wait"]);
+    assert!(!said.contains("http://"), "{said}");
+    succeed(&["play", text(&package.join("manifest.mpd")), "--no-wait", "--no-decode"]);
+}
