@@ -9,6 +9,7 @@ use crate::whole_file::read_whole;
 use clap::Args;
 use serde::Serialize;
 use splatstream_chart::numbers::grouped;
+use splatstream_format::Class;
 use splatstream_stream::manifest::Manifest;
 use splatstream_stream::package::Package;
 use splatstream_stream::unpackage::{unpackage, unpackage_growing};
@@ -17,8 +18,7 @@ use std::path::{Path, PathBuf};
 /// Write the stream that a package was made of, byte for byte.
 #[derive(Args)]
 #[command(after_help = "Example:\n  splatstream unpackage talk/ -o talk.gss\n\n\
-    Reads every .mp4 and .m4s file of the directory. A manifest beside them is used to check the result.\n    \
-    Of a live package that has not ended, the GOPs that are complete are written, with an end made for them.")]
+    Reads every .mp4 and .m4s file of the directory. A manifest beside them is used to check the result.")]
 pub(crate) struct Unpackage {
     /// The directory of the package.
     #[arg(value_name = "DIR")]
@@ -26,6 +26,9 @@ pub(crate) struct Unpackage {
     /// The stream to write; - is standard output.
     #[arg(short, long = "out", value_name = "OUT.gss")]
     out: PathBuf,
+    /// Of a live package that has not ended: write the GOPs that are complete, with an end made for them.
+    #[arg(long)]
+    incomplete: bool,
     #[command(flatten)]
     limits: SizeArgs,
 }
@@ -55,6 +58,7 @@ impl Unpackage {
         self.check_complete(&paths, manifest.as_ref())?;
         let growing = manifest.as_ref().filter(|manifest| manifest.is_growing());
         match growing {
+            Some(_) if !self.incomplete => return Err(self.not_ended()),
             // What comes after the complete GOPs is still being written.
             Some(manifest) => paths.retain(|path| is_complete(path, manifest)),
             None => self.check_ended(&paths)?,
@@ -136,6 +140,16 @@ impl Unpackage {
                 self.directory.join(name).display()
             ))),
         }
+    }
+
+    /// A package that has not ended is no valid one yet, which is nobody's fault.
+    fn not_ended(&self) -> Failure {
+        let line = format!(
+            "{}: the package is live and has not ended\n  \
+             unpackage it when it has ended, or write the GOPs that are complete with --incomplete",
+            self.directory.display()
+        );
+        Failure::Verdict { exit_code: Class::Invalid.exit_code(), line }
     }
 
     /// Whether a live package, whose manifest does not say that it grows, has its last file.

@@ -181,7 +181,9 @@ fn a_package_that_has_not_ended_gives_a_stream_of_what_is_there() {
         packager.stdin.take().unwrap().write_all(&pieces[..3].concat()).unwrap();
         assert_eq!(packager.wait().unwrap().code(), Some(14));
         let back = directory.path().join("back.gss");
-        let output = common::run(&["unpackage", text(&out), "-o", text(&back), "--json"]);
+        let said = common::fail(11, &["unpackage", text(&out), "-o", text(&back)]);
+        assert!(said.contains("has not ended") && said.contains("--incomplete") && !back.exists(), "{said}");
+        let output = common::run(&["unpackage", text(&out), "-o", text(&back), "--incomplete", "--json"]);
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success() && said.contains("has not ended"), "{said}");
         let report: Value = serde_json::from_slice(&output.stdout).unwrap();
