@@ -23,7 +23,6 @@
 mod baselines;
 mod driven;
 mod fetch;
-mod idle;
 pub(crate) mod ladder;
 mod layered;
 mod live;
@@ -33,7 +32,6 @@ mod plan;
 mod rule;
 mod session;
 mod single;
-mod start;
 mod state;
 mod throughput;
 

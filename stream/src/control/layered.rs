@@ -1,14 +1,17 @@
 //! The rule for layered streams.
 
+mod idle;
+mod start;
+
 use super::fetch::Fetch;
-use super::idle::is_played_again;
 use super::ladder::{Gop, Levels};
 use super::number::{count, real, seconds};
 use super::options::{Choice, choices, gain};
 use super::plan::{Outlook, best};
 use super::rule::{Decision, Rule};
-use super::start::shortness;
 use super::state::{Playback, Request, State};
+use idle::is_played_again;
+use start::shortness;
 
 /// What the rule goes by. The defaults were tuned on one half of a set of traces and checked on the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +66,7 @@ impl Default for Weights {
 /// - Live, playback runs a little faster or slower towards the latency that is aimed at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Layered {
-    pub(super) weights: Weights,
+    weights: Weights,
     /// Whether nothing but files is between.
     is_local: bool,
 }
@@ -80,7 +83,7 @@ impl Layered {
         Self { is_local: true, ..Self::default() }
     }
 
-    pub(super) fn outlook(&self, state: &State) -> Outlook {
+    fn outlook(&self, state: &State) -> Outlook {
         let weights = &self.weights;
         let (least, most) =
             super::ladder::quality_range(horizon(state, state.first_missing(), weights.horizon));
@@ -222,7 +225,7 @@ const STEADY_ERROR: f64 = 0.05;
 const LEISURE: f64 = 0.25;
 
 /// Requests what is missing, in few ranges if there is time.
-pub(super) fn request(state: &State, outlook: &Outlook, gop: usize, wanted: &Levels) -> Option<Fetch> {
+fn request(state: &State, outlook: &Outlook, gop: usize, wanted: &Levels) -> Option<Fetch> {
     let fetch = Fetch::towards(state, gop, wanted)?;
     let until = time_until(state, gop);
     if outlook.time(fetch.bytes()) > LEISURE * until {
@@ -266,7 +269,7 @@ fn left(state: &State) -> f64 {
 }
 
 /// The next GOPs from one on.
-pub(super) fn horizon(state: &State, from: usize, count: usize) -> &[Gop] {
+fn horizon(state: &State, from: usize, count: usize) -> &[Gop] {
     let gops = state.ladder().gops();
     let to = from.saturating_add(count.max(1)).min(gops.len());
     gops.get(from.min(to)..to).unwrap_or_default()

@@ -1,12 +1,12 @@
 //! What the rule for layered streams does with time in which nothing else is to be fetched.
 
-use super::fetch::Fetch;
-use super::layered::{Layered, horizon, request};
-use super::number::seconds;
-use super::options::Choice;
-use super::plan::{Outlook, best};
 use super::start::{SHORT_US, whole_of_first};
-use super::state::State;
+use super::{Layered, horizon, request};
+use crate::control::fetch::Fetch;
+use crate::control::number::seconds;
+use crate::control::options::Choice;
+use crate::control::plan::{Outlook, best};
+use crate::control::state::State;
 
 /// Whether GOPs that were played are fetched, since they are likely to be played again: a viewer has the playhead, all of the
 /// presentation fits into the buffer, and it is short or is played in a loop.

@@ -1,12 +1,12 @@
 //! The start of playback under the rule for layered streams: what is fetched before it, and how long it waits for that.
 
-use super::fetch::Fetch;
-use super::layered::{Layered, horizon};
-use super::number::{real, seconds};
-use super::options::Choice;
-use super::plan::{Outlook, best};
-use super::state::State;
-use super::throughput::Transfer;
+use super::{Layered, horizon};
+use crate::control::fetch::Fetch;
+use crate::control::number::{real, seconds};
+use crate::control::options::Choice;
+use crate::control::plan::{Outlook, best};
+use crate::control::state::State;
+use crate::control::throughput::Transfer;
 use core::ops::Range;
 
 /// Time from the beginning of a session within which the start may wait for more than the base.
