@@ -130,8 +130,9 @@ const stands = ({ wanted, index, until }) => index <= wanted && wanted < until;
 test('a seek resolves with the frame that was asked for, or with what stands for it at the best point', async () => {
   const page = await player(await served(40, '--latency', '20'), { autoplay: 'no' });
   const found = await seeks(page, [12, 61, 3, 95, 0, 42]);
-  // The best point of this scene has every second frame.
-  assert.ok(found.every((one) => stands(one) && one.until <= one.index + 2 && one.point.refinement === 2), JSON.stringify(found));
+  // The best point of this scene has every second frame. A frame that was asked for may come before it is at its best.
+  const isDue = (one) => one.index === one.wanted || one.point.refinement === 2;
+  assert.ok(found.every((one) => stands(one) && one.until <= one.index + 2 && isDue(one)), JSON.stringify(found));
   await check(found);
   await check(await page.finish());
 });
