@@ -77,7 +77,8 @@ impl StreamDecoder {
     }
 
     /// A decoder of the frames from the GOP on whose header stands at the absolute offset `gop`, as an index gives it
-    /// (B.3). What stands before it is not looked at, but for the units up to the first sequence parameters.
+    /// (B.3). What stands before it is not looked at, but for the units up to the first sequence parameters, and the scene
+    /// description that follows these, if it is intact.
     pub fn inside(gop: u64, options: &Options) -> Self {
         Self { inside: Some(gop), ..Self::new(options) }
     }
@@ -151,6 +152,16 @@ impl StreamDecoder {
                 _ => Ok(Some(Step::End)),
             };
         };
+        if self.inside.is_some()
+            && decoder.sequence().is_some()
+            && !matches!(event, Ok(Event::NeedMoreData(_)))
+        {
+            if let Ok(Event::Unit(unit)) = event {
+                decoder.take_description(&unit);
+            }
+            self.go_inside();
+            return Ok(None);
+        }
         let frame = match event {
             Ok(Event::Unit(unit)) => self.unit(&unit),
             Err(error) => {
@@ -209,11 +220,9 @@ impl StreamDecoder {
     fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
         let decoder = self.decoder.as_mut()?;
         let frame = decoder.unit(unit);
-        match unit.header.unit_type() {
-            // An end unit with a fault is not the end.
-            UnitType::End if !decoder.has_stopped() => self.reader.reopen(),
-            UnitType::SequenceParameters => self.go_inside(),
-            _ => {}
+        // An end unit with a fault is not the end.
+        if unit.header.unit_type() == UnitType::End && !decoder.has_stopped() {
+            self.reader.reopen();
         }
         frame
     }

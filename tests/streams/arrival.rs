@@ -219,6 +219,24 @@ proptest! {
 }
 
 #[test]
+fn a_seek_before_the_first_frame_keeps_the_description() {
+    let bytes = include_bytes!("../../conformance/vectors/valid/loss/resync-parent/in.gss").as_slice();
+    let damaged =
+        include_bytes!("../../conformance/vectors/invalid/loss/resync-scene-description-damaged/in.gss")
+            .as_slice();
+    let mut from_start = Decoder::from_bytes(bytes);
+    drop(from_start.next_frame().unwrap());
+    for (bytes, expected) in [(bytes, from_start.description()), (damaged, None)] {
+        let mut decoder = Decoder::from_bytes(bytes);
+        decoder.seek(Position::Frame(2)).unwrap();
+        assert_eq!(decoder.next_frame().unwrap().map(|frame| frame.index()), Some(2));
+        assert_eq!(decoder.description(), expected);
+        assert!(decoder.all(|frame| frame.unwrap().warnings().is_empty()));
+    }
+    assert!(from_start.description().is_some());
+}
+
+#[test]
 fn a_time_is_the_frame_that_is_shown_then() {
     let mut decoder = Decoder::from_bytes(vectors::talk());
     decoder.seek(Position::Time(std::time::Duration::from_millis(170))).unwrap();

@@ -16,7 +16,9 @@ use crate::layout::{Section, ShCoding};
 use crate::steps::StepRule;
 use splatstream_format::entropy::in_force::ModelsInForce;
 use splatstream_format::payload::{Cells, FramePayload, SceneDescription};
-use splatstream_format::syntax::{FrameHeader, FrameRole, GopHeader, SequenceParameters, UnitHeader};
+use splatstream_format::syntax::{
+    FrameHeader, FrameRole, GopHeader, SequenceParameters, UnitHeader, UnitType,
+};
 use splatstream_format::unit::Unit;
 use splatstream_format::{Error, ErrorKind, Result};
 use std::sync::Arc;
@@ -25,6 +27,14 @@ impl Decoder {
     /// What the stream says of its scene, once that has come.
     pub fn scene(&self) -> Option<&SceneDescription> {
         self.scene.as_deref()
+    }
+
+    /// Takes a unit that follows the sequence parameters where decoding goes on from a GOP (B.3), if it is a scene
+    /// description. One with a fault is left out and is no error: a decoder that starts there need not have any.
+    pub(crate) fn take_description(&mut self, unit: &Unit<'_>) {
+        if unit.header.unit_type() == UnitType::SceneDescription && unit.check_header(self.profile).is_ok() {
+            let _left_out = self.content(unit, false);
+        }
     }
 
     pub(super) fn scene_description(&mut self, unit: &Unit<'_>) -> Result<()> {
