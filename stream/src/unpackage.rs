@@ -38,7 +38,7 @@ pub fn unpackage(files: &[(String, &[u8])], limits: &Limits) -> Result<Vec<u8>, 
 }
 
 /// The stream of the GOPs of a live package that has not ended, with an end unit that is made for it as clause 7.11 makes those
-/// of extracted streams. `files` have complete GOPs only.
+/// of extracted streams, and without a number of frames in its sequence parameters. `files` have complete GOPs only.
 ///
 /// # Errors
 /// As [`unpackage`], and a package that has ended.
@@ -70,8 +70,7 @@ fn put_together(files: &[(String, &[u8])], limits: &Limits, has_ended: bool) -> 
     stream.extend_from_slice(base.tail);
     let in_stream = |error| FileError { file: "the stream in the package".to_owned(), error };
     if !has_ended {
-        let end = end_of(&stream, limits).map_err(in_stream)?;
-        stream.extend(end);
+        end_here(&mut stream, limits).map_err(in_stream)?;
     }
     let whole = Division::of(&stream, limits).map_err(in_stream)?;
     let pieces = whole.gops.iter().flat_map(|gop| &gop.pieces);
@@ -79,11 +78,14 @@ fn put_together(files: &[(String, &[u8])], limits: &Limits, has_ended: bool) -> 
     Ok(stream)
 }
 
-/// The end unit of a stream without one: it counts frames and units, and knows no index, since those that a stream may have
-/// come after its last GOP.
-fn end_of(stream: &[u8], limits: &Limits) -> splatstream_format::Result<Vec<u8>> {
+/// Ends a stream that has no end unit: with one that counts frames and units, and knows no index, since those that a stream may
+/// have come after its last GOP. Sequence parameters announce no frames any more, as not all that they announced are there.
+fn end_here(stream: &mut Vec<u8>, limits: &Limits) -> splatstream_format::Result<()> {
     let mut end = EndOfStream { frame_count: 0, unit_count: 0, index_offset: 0 };
-    let mut units = Stream::open(stream, limits)?.units();
+    let mut changed = Vec::new();
+    let opened = Stream::open(stream, limits)?;
+    let profile = opened.header().profile();
+    let mut units = opened.units();
     let whole = u64::try_from(stream.len()).unwrap_or(u64::MAX);
     while let Some(unit) = units.next_unit() {
         let unit = match unit {
@@ -91,13 +93,27 @@ fn end_of(stream: &[u8], limits: &Limits) -> splatstream_format::Result<Vec<u8>>
             Err(error) if error.at == whole => break,
             unit => unit?,
         };
-        let is_frame = unit.header.unit_type() == UnitType::FrameHeader;
-        end.frame_count = end.frame_count.saturating_add(u32::from(is_frame));
+        let kind = unit.header.unit_type();
+        end.frame_count = end.frame_count.saturating_add(u32::from(kind == UnitType::FrameHeader));
         end.unit_count = end.unit_count.saturating_add(1);
+        if kind == UnitType::SequenceParameters {
+            let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?;
+            let payload = SequenceParameters { frame_count: 0, ..sequence }.to_bytes()?;
+            changed.push((unit.at, whole_unit(kind, &payload)?));
+        }
     }
-    let payload = end.to_bytes()?;
-    let header = UnitHeader::new(UnitId::stream(UnitType::End), &payload)?;
-    Ok([header.to_bytes()?.to_vec(), payload.to_vec()].concat())
+    for (at, bytes) in changed {
+        let place = usize::try_from(at).ok().and_then(|at| stream.get_mut(at..)?.get_mut(..bytes.len()));
+        place.into_iter().for_each(|place| place.copy_from_slice(&bytes));
+    }
+    stream.extend(whole_unit(UnitType::End, &end.to_bytes()?)?);
+    Ok(())
+}
+
+/// Header and payload of a unit that is of the whole stream.
+fn whole_unit(kind: UnitType, payload: &[u8]) -> splatstream_format::Result<Vec<u8>> {
+    let header = UnitHeader::new(UnitId::stream(kind), payload)?;
+    Ok([&header.to_bytes()?[..], payload].concat())
 }
 
 /// What the base Representation carries for all.

@@ -6,9 +6,12 @@ mod common;
 use arbitrary::{Arbitrary, Unstructured};
 use common::mpd::check;
 use common::{File, is_conforming, vectors, worked_example};
+use core::ops::ControlFlow;
 use proptest::prelude::*;
 use roxmltree::Document;
 use serde_json::Value;
+use splatstream_decoder::process::Options as DecoderOptions;
+use splatstream_decoder::stream::decode_stream;
 use splatstream_format::Limits;
 use splatstream_format::arbitrary_stream::ArbitraryStream;
 use splatstream_format::syntax::UnitType;
@@ -180,34 +183,54 @@ fn every_conforming_vector_comes_back_from_its_segments() {
     }
 }
 
+/// The stream of the GOPs of a live package that has not ended, when `count` of them are complete.
+fn unpackaged(stream: &[u8], whole: &Division, count: usize) -> Vec<u8> {
+    // The GOP after it has begun, so that it is complete.
+    let begun = whole.gops[count].pieces[0].end as usize;
+    let mut live = Live::new(&settings(Layout::Gop), &Limits::default());
+    let mut directory = Directory::default();
+    directory.apply(live.push(&stream[..begun], START).unwrap());
+    let complete = directory.manifests.last().unwrap().complete_gops();
+    assert_eq!(complete, count);
+    directory.files.retain(|name, _| !name.ends_with(&format!("-{}.m4s", complete + 1)));
+    let media = directory.media();
+    let given: Vec<_> = media.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
+    // One that has not ended is not taken for one that has.
+    assert!(unpackage(&given, &Limits::default()).is_err());
+    unpackage_growing(&given, &Limits::default()).unwrap()
+}
+
 #[test]
 fn complete_gops_of_a_package_that_has_not_ended_are_a_stream() {
     let path = vectors().into_iter().find(|path| path.to_string_lossy().contains("temporal-gops-mixed"));
     let stream = std::fs::read(path.unwrap()).unwrap();
-    let whole = Division::of(&stream, &Limits::default()).unwrap();
-    for count in 1..whole.gops.len() {
-        // The GOP after it has begun, so that it is complete.
-        let end = whole.gops[count].start as usize;
-        let mut live = Live::new(&settings(Layout::Gop), &Limits::default());
-        let mut directory = Directory::default();
-        directory.apply(live.push(&stream[..end + 64], START).unwrap());
-        let complete = directory.manifests.last().unwrap().complete_gops();
-        directory.files.retain(|name, _| !name.ends_with(&format!("-{}.m4s", complete + 1)));
-        let media = directory.media();
+    // This one announces its frames, of which a part has fewer.
+    let announcing = include_bytes!("../../examples/talk.gss").as_slice();
+    for (stream, announces) in [(stream.as_slice(), false), (announcing, true)] {
+        let whole = Division::of(stream, &Limits::default()).unwrap();
+        for count in 1..whole.gops.len() {
+            let part = unpackaged(stream, &whole, count);
+            assert_eq!(Division::of(&part, &Limits::default()).unwrap().gops.len(), count);
+            let (mut kept, mut changed) = (stream[..whole.gops[count].start as usize].to_vec(), false);
+            let units = Stream::open(&part, &Limits::default()).unwrap().units();
+            let mut last = None;
+            for unit in units.map(Result::unwrap) {
+                last = Some(unit.header.unit_type());
+                if last == Some(UnitType::SequenceParameters) {
+                    let own = unit.at as usize..unit.payload_at as usize + unit.payload.len();
+                    changed |= kept[own.clone()] != part[own.clone()];
+                    kept[own.clone()].copy_from_slice(&part[own]);
+                }
+            }
+            assert_eq!((last, changed), (Some(UnitType::End), announces));
+            assert!(part.starts_with(&kept));
+            let summary = decode_stream(&part, &DecoderOptions::default(), |_, _| ControlFlow::Continue(()));
+            assert_eq!((summary.errors, summary.lost), (Vec::new(), Vec::new()));
+        }
+        let media = live(stream, Layout::Gop, 1000).media();
         let given: Vec<_> = media.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
-        let part = unpackage_growing(&given, &Limits::default()).unwrap();
-        let divided = Division::of(&part, &Limits::default()).unwrap();
-        assert_eq!((complete, divided.gops.len()), (count, count));
-        assert!(part[..end] == stream[..end]);
-        let units = Stream::open(&part, &Limits::default()).unwrap().units();
-        let kinds: Vec<UnitType> = units.map(|unit| unit.unwrap().header.unit_type()).collect();
-        assert_eq!(kinds.last(), Some(&UnitType::End));
-        // One that has ended is not taken for one that has not, nor the other way round.
-        assert!(unpackage(&given, &Limits::default()).is_err());
+        assert!(unpackage_growing(&given, &Limits::default()).is_err());
     }
-    let media = live(&stream, Layout::Gop, 1000).media();
-    let given: Vec<_> = media.iter().map(|(name, bytes)| (name.clone(), bytes.as_slice())).collect();
-    assert!(unpackage_growing(&given, &Limits::default()).is_err());
 }
 
 // covers: SS-CR-028, SS-CR-029
