@@ -7,7 +7,7 @@ use super::fetch::Fetch;
 use super::ladder::{Gop, Levels};
 use super::number::{count, real, seconds};
 use super::options::{Choice, choices, gain};
-use super::plan::{Outlook, best};
+use super::plan::{Outlook, Stage, best};
 use super::rule::{Decision, Rule};
 use super::state::{Playback, Request, State};
 use idle::is_played_again;
@@ -117,16 +117,19 @@ impl Layered {
         self.weights.price + (1.0 - self.weights.price).max(0.0) * steady
     }
 
+    /// What can be chosen of the GOPs that are planned ahead, from one on; those of which nothing can are left out.
+    fn stages(&self, state: &State, from: usize) -> Vec<Stage> {
+        let gops = horizon(state, from, self.weights.horizon).iter().zip(from..);
+        let stages =
+            gops.map(|(gop, index)| Stage::new(index, state.choices(index), seconds(gop.duration_us())));
+        stages.filter(|stage| !stage.choices.is_empty()).collect()
+    }
+
     /// What to fetch for the next GOP, and what quality it will have.
     fn extend(&self, state: &State, outlook: &Outlook) -> Option<Choice> {
-        let next = state.first_missing();
-        let gops = horizon(state, next, self.weights.horizon).iter().zip(next..);
-        let stages: Vec<(Vec<Choice>, f64)> = gops
-            .map(|(gop, index)| (state.choices(index), seconds(gop.duration_us())))
-            .filter(|(choices, _)| !choices.is_empty())
-            .collect();
+        let stages = self.stages(state, state.first_missing());
         let (index, _) = best(&stages, outlook);
-        stages.into_iter().next()?.0.into_iter().nth(index)
+        stages.into_iter().next()?.choices.into_iter().nth(index)
     }
 
     /// The upgrade of a buffered GOP that gains most in the time it takes; none if none gains. `next` is the quality planned

@@ -42,6 +42,24 @@ impl Outlook {
     }
 }
 
+/// A GOP that a plan chooses for.
+#[derive(Clone, Debug)]
+pub(crate) struct Stage {
+    /// Its number.
+    pub(crate) gop: usize,
+    /// What it can be chosen to have, from the cheapest on.
+    pub(crate) choices: Vec<Choice>,
+    /// Its duration in seconds.
+    pub(crate) duration: f64,
+}
+
+impl Stage {
+    /// A GOP with its choices and its duration in seconds.
+    pub(crate) fn new(gop: usize, choices: Vec<Choice>, duration: f64) -> Self {
+        Self { gop, choices, duration }
+    }
+}
+
 /// Plans that are kept from GOP to GOP.
 const WIDTH: usize = 48;
 
@@ -53,12 +71,11 @@ struct Plan {
     value: f64,
 }
 
-/// The index of the best first choice, and what the plan that begins with it is worth. Stages are the choices for the next
-/// GOPs and their durations in seconds.
-pub(crate) fn best(stages: &[(Vec<Choice>, f64)], outlook: &Outlook) -> (usize, f64) {
+/// The index of the best choice for the first stage, and what the plan that begins with it is worth.
+pub(crate) fn best(stages: &[Stage], outlook: &Outlook) -> (usize, f64) {
     let start = Plan { first: 0, buffer: outlook.buffer, before: outlook.before, value: 0.0 };
     let mut plans = vec![start];
-    for (number, (choices, duration)) in stages.iter().enumerate() {
+    for (number, Stage { choices, duration, .. }) in stages.iter().enumerate() {
         let mut next = Vec::with_capacity(plans.len().saturating_mul(choices.len()));
         for plan in &plans {
             for (index, choice) in choices.iter().enumerate() {

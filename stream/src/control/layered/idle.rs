@@ -1,10 +1,9 @@
 //! What the rule for layered streams does with time in which nothing else is to be fetched.
 
 use super::start::{SHORT_US, whole_of_first};
-use super::{Layered, horizon, request};
+use super::{Layered, request};
 use crate::control::fetch::Fetch;
 use crate::control::number::seconds;
-use crate::control::options::Choice;
 use crate::control::plan::{Outlook, best};
 use crate::control::state::State;
 
@@ -30,26 +29,21 @@ impl Layered {
     /// than those around it gains nothing, so that choosing one GOP at a time would improve none. The plan may
     /// begin with a later GOP, if nothing can come in time for those before it.
     fn before_end(&self, state: &State, outlook: &Outlook) -> Option<Fetch> {
-        let first = state.first_open();
-        let gops = horizon(state, first, self.weights.horizon).iter().zip(first..);
-        let stages: Vec<(usize, Vec<Choice>, f64)> = gops
-            .map(|(gop, index)| (index, state.choices(index), seconds(gop.duration_us())))
-            .filter(|(_, choices, _)| !choices.is_empty())
-            .collect();
-        for (number, (gop, choices, _)) in stages.iter().enumerate() {
+        let stages = self.stages(state, state.first_open());
+        let mut rest = stages.as_slice();
+        while let Some((stage, later)) = rest.split_first() {
             let outlook = Outlook {
                 throughput: outlook.throughput * self.weights.haste,
-                buffer: seconds(state.media_until(*gop)),
-                before: state.quality_before(*gop),
+                buffer: seconds(state.media_until(stage.gop)),
+                before: state.quality_before(stage.gop),
                 price: 0.0,
                 ..*outlook
             };
-            let rest = stages.get(number..).unwrap_or_default().iter();
-            let rest: Vec<_> = rest.map(|(_, choices, duration)| (choices.clone(), *duration)).collect();
-            let (index, _) = best(&rest, &outlook);
-            if let Some(chosen) = choices.get(index).filter(|chosen| chosen.bytes > 0) {
-                return request(state, &outlook, *gop, &chosen.levels);
+            let (index, _) = best(rest, &outlook);
+            if let Some(chosen) = stage.choices.get(index).filter(|chosen| chosen.bytes > 0) {
+                return request(state, &outlook, stage.gop, &chosen.levels);
             }
+            rest = later;
         }
         None
     }

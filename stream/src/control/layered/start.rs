@@ -1,9 +1,8 @@
 //! The start of playback under the rule for layered streams: what is fetched before it, and how long it waits for that.
 
-use super::{Layered, horizon};
+use super::Layered;
 use crate::control::fetch::Fetch;
 use crate::control::number::{real, seconds};
-use crate::control::options::Choice;
 use crate::control::plan::{Outlook, best};
 use crate::control::state::State;
 use crate::control::throughput::Transfer;
@@ -60,13 +59,9 @@ impl Layered {
             return whole_of_first(state, open(state)).filter(|_| late > 0.0);
         }
         let first = state.current();
-        let gops = horizon(state, first, self.weights.horizon).iter().zip(first..);
-        let stages: Vec<(Vec<Choice>, f64)> = gops
-            .map(|(gop, index)| (state.choices(index), seconds(gop.duration_us())))
-            .filter(|(choices, _)| !choices.is_empty())
-            .collect();
+        let stages = self.stages(state, first);
         let (index, _) = best(&stages, &outlook);
-        let chosen = stages.into_iter().next()?.0.into_iter().nth(index)?;
+        let chosen = stages.into_iter().next()?.choices.into_iter().nth(index)?;
         let fits = outlook.time(chosen.bytes) <= left;
         if fits { Fetch::at_leisure(state, first, &chosen.levels) } else { None }
     }
