@@ -79,7 +79,7 @@ fn is_damaged(frame: &Frame) -> bool {
 impl Report {
     fn new(command: &Extract, stream: &StreamFile, extracted: &[u8], limits: &Limits) -> Self {
         let (whole, part) = (Structure::of(&stream.bytes, limits), Structure::of(extracted, limits));
-        let announced = Some(stream.frame_count(limits)).filter(|&count| count > 0);
+        let announced = Some(stream.frame_count_of(&whole, limits)).filter(|&count| count > 0);
         let there = frames_of(&whole).map(|frame| frame.index).collect();
         let lost = whole.missing(&there, announced, layers_of(OperatingPoint::ALL));
         let damaged: Vec<u32> =

@@ -146,11 +146,20 @@ impl StreamFile {
     /// How many frames there are: as many as the stream announces or, where it announces none, as its GOPs have if its end unit
     /// shows that all of them came. 0 if nothing tells.
     pub(crate) fn frame_count(&self, limits: &Limits) -> u32 {
-        let announced = self.sequence(limits).map_or(0, |sequence| sequence.frame_count);
-        if announced > 0 {
-            return announced;
-        }
-        let structure = Structure::of(&self.bytes, limits);
+        let announced = self.announced(limits);
+        announced.unwrap_or_else(|| Self::counted(&Structure::of(&self.bytes, limits)))
+    }
+
+    /// The same where the structure of the stream is known.
+    pub(crate) fn frame_count_of(&self, structure: &Structure, limits: &Limits) -> u32 {
+        self.announced(limits).unwrap_or_else(|| Self::counted(structure))
+    }
+
+    fn announced(&self, limits: &Limits) -> Option<u32> {
+        self.sequence(limits).map(|sequence| sequence.frame_count).filter(|&count| count > 0)
+    }
+
+    fn counted(structure: &Structure) -> u32 {
         structure.gops.last().filter(|_| structure.has_all_units()).map_or(0, Gop::end)
     }
 
