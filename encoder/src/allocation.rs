@@ -13,7 +13,7 @@
 use crate::attribute::{ATTRIBUTES, Attribute};
 use crate::error::Error;
 use crate::frame::grain::Grains;
-use crate::grid::{MAX_LOG_SCALE, MAX_OPACITY};
+use crate::grid::{MAX_LOG_SCALE, MAX_OPACITY, USUAL};
 use crate::importance::Ranked;
 use crate::laws::Laws;
 use crate::pca::Components;
@@ -51,8 +51,6 @@ const NEAR: f64 = 0.2;
 const NEAR_FAST: f64 = 0.3;
 /// What pictures of most scenes gain where steps are fitted for a decibel more.
 const SLOPE: f64 = 1.0;
-/// Magnitudes of log-scales and opacities beyond which they are mistakes, and not for steps to follow.
-const USUAL: [f32; 2] = [24.0, 100.0];
 /// What halving all steps brings.
 const DECIBELS_AN_OCTAVE: f64 = 6.02;
 /// The step of one attribute changes by no more than this factor at once: the model is local.

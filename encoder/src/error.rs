@@ -72,7 +72,7 @@ pub enum Error {
     },
     /// An attribute cannot be put on its quantisation grid.
     #[error(
-        "frame {frame}: {attribute} of Gaussian {row} is {value}, too far out for a step of {step}; \
+        "frame {frame}: {attribute} of Gaussian {row} is {value}, and with these quantisers a stream carries -{most} to {most}; \
          number of such Gaussians in the frame: {count}, farthest of all Gaussian {farthest_row} with {farthest}"
     )]
     OutOfGrid {
@@ -84,8 +84,8 @@ pub enum Error {
         row: usize,
         /// Its value.
         value: f32,
-        /// The step of the grid.
-        step: f32,
+        /// The largest magnitude that the grid reaches.
+        most: f32,
         /// Gaussians of the frame that are, in the same component of the attribute.
         count: usize,
         /// The one that is farthest out.

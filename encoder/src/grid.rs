@@ -15,6 +15,9 @@ pub(crate) const MAX_DIFFERING: f32 = 16_000.0;
 pub(crate) const MAX_LOG_SCALE: f32 = MAX_DIFFERING;
 /// The largest magnitude of an opacity, finest steps: it fits 16 bits itself.
 pub(crate) const MAX_OPACITY: f32 = 32_000.0;
+/// Magnitudes of log-scales and opacities beyond which they are mistakes, and not for steps to follow: a frame is refused for
+/// them, if steps do not reach so far.
+pub(crate) const USUAL: [f32; 2] = [24.0, 100.0];
 /// The largest magnitude of a position, scene units: sums of two of them are finite, and so are the squares of what
 /// they become in steps.
 const MAX_POSITION: f32 = (1_u64 << 38) as f32;
@@ -176,7 +179,8 @@ fn part(value: f32, offset: f32, scale: f32) -> i32 {
     nearest_integer(((value - offset) * scale).clamp(-MOST, MOST))
 }
 
-/// Whether the values of some Gaussians of a source frame are such that a decoder can have them.
+/// Whether the values of some Gaussians of a source frame are such that a decoder can have them. Steps of log-scale and opacity
+/// that are too fine for usual values become coarser, so that no frame is refused for these.
 ///
 /// # Errors
 /// The first value of an attribute that is too far out, and the one that is farthest out.
@@ -202,12 +206,14 @@ pub(crate) fn check_reach(
             attribute,
             row: first as usize,
             value: value(first),
-            step,
+            most: step * most,
             count: out().count(),
             farthest_row: farthest as usize,
             farthest: value(farthest),
         })
     };
+    let log_scale_step = log_scale_step.max(USUAL[0] / MAX_LOG_SCALE);
+    let opacity_step = opacity_step.max(USUAL[1] / MAX_OPACITY);
     let positions = frame.position().iter().map(|plane| ("position", plane.as_slice(), 1.0, MAX_POSITION));
     let sizes = frame.log_scale().iter();
     let sizes = sizes.map(|plane| ("log_scale", plane.as_slice(), log_scale_step, MAX_LOG_SCALE));

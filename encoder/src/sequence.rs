@@ -3,7 +3,7 @@
 use crate::canonical::{canonicalise, visible};
 use crate::entropy_cost::entropy_of;
 use crate::error::Error;
-use crate::grid::{MAX_COLOUR, MAX_DIFFERING, check_reach, nearest_integer};
+use crate::grid::{MAX_COLOUR, MAX_DIFFERING, MAX_LOG_SCALE, MAX_OPACITY, check_reach, nearest_integer};
 use crate::laws::{FEATURE_SHIFT, finest};
 use crate::reach::{Core, Extent, Reach};
 use crate::settings::{Settings, Size, Structure};
@@ -350,10 +350,11 @@ impl Scene {
             ticks_per_second: settings.ticks.0,
             ticks_per_frame: settings.ticks.1,
             log_scale_offset: self.origins[0].to_bits(),
-            log_scale_step: finest(steps.log_scale, scale, MAX_DIFFERING).to_bits(),
+            log_scale_step: finest(steps.log_scale.max(scale / MAX_LOG_SCALE), scale, MAX_DIFFERING)
+                .to_bits(),
             rotation_step: finest(rotation, 1.0, MAX_DIFFERING).to_bits(),
             opacity_offset: self.origins[1].to_bits(),
-            opacity_step: finest(steps.opacity, opacity, MAX_DIFFERING).to_bits(),
+            opacity_step: finest(steps.opacity.max(opacity / MAX_OPACITY), opacity, MAX_DIFFERING).to_bits(),
             dc_step: colour(steps.dc, dc).to_bits(),
             sh_step: colour(steps.sh, sh).to_bits(),
             ..SequenceParameters::PLAIN
