@@ -16,7 +16,7 @@ use crate::progress::Progress;
 use crate::report::{Report, TargetReport};
 use crate::secant::Secant;
 use crate::sequence;
-use crate::settings::{Settings, Size};
+use crate::settings::{Settings, ShChoice, Size};
 use crate::source::FrameSource;
 use crate::window::FirstFrames;
 use fitting::{Fitting, Way};
@@ -49,6 +49,8 @@ const ALONE: f64 = 0.85;
 /// Encodings for a PSNR and for a size, at most.
 const MOST_FOR_PSNR: usize = 4;
 const MOST_FOR_SIZE: usize = 6;
+/// And without a codebook, where a size is found with one.
+const MOST_WITHOUT_CODEBOOK: usize = 3;
 
 /// Frames of a sequence on which sizes are tried: with one or two temporal layers, and with more.
 const PART_FOR_SIZE: [u32; 2] = [5, 9];
@@ -152,6 +154,8 @@ struct Found {
     gained: Option<f64>,
     /// What a Gaussian of theirs takes, as a part of what one of an I frame does.
     share_of_intra: f64,
+    /// Entries of their codebooks of SH.
+    codebook_entries: u32,
     /// The stream, if these were all frames.
     encoded: Option<Encoded>,
 }
@@ -160,7 +164,9 @@ impl Found {
     fn new(fitted: f64, encoded: Encoded, is_whole: bool) -> Self {
         let report = &encoded.report;
         let (price, gained, share_of_intra) = (price(report), gained(report), share_of_intra(report));
-        Self { fitted, price, gained, share_of_intra, encoded: is_whole.then_some(encoded) }
+        let codebook_entries = report.sh_codebook_entries;
+        let encoded = is_whole.then_some(encoded);
+        Self { fitted, price, gained, share_of_intra, codebook_entries, encoded }
     }
 }
 
@@ -306,7 +312,28 @@ impl<'a> Seeker<'a> {
             }
             (first, slope) = (secant.best(), secant.slope());
         }
-        let mut secant = Secant::new(goal, NEAR_SIZE, slope, MOST_FOR_SIZE);
+        let found = self.size_near(size, goal, (first, slope, MOST_FOR_SIZE))?;
+        if !self.fitting.may_do_without_codebook(found.codebook_entries) {
+            return Ok(found);
+        }
+        // The fit knows of coefficients only, and a size does not say what a codebook costs pictures.
+        let auto = core::mem::replace(&mut self.fitting.way.sh, ShChoice::Coefficients);
+        let without = self.size_near(size, goal, (found.fitted, slope, MOST_WITHOUT_CODEBOOK))?;
+        if without.price < found.price {
+            return Ok(without);
+        }
+        self.fitting.way.sh = auto;
+        Ok(found)
+    }
+
+    /// The same from a PSNR on, with a slope and a number of encodings at most.
+    fn size_near(
+        &mut self,
+        size: Size,
+        goal: f64,
+        (first, slope, most): (f64, f64, usize),
+    ) -> Result<Found, Error> {
+        let mut secant = Secant::new(goal, NEAR_SIZE, slope, most);
         let mut best: Option<Found> = None;
         let mut next = Some(first);
         while let Some(at) = next {
@@ -399,7 +426,9 @@ fn is_predicted(report: &Report) -> bool {
 
 /// The logarithm of what a Gaussian of encoded frames would take at a PSNR that is the same for all.
 fn price(report: &Report) -> f64 {
-    let psnr = report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr()).unwrap_or(0.0);
+    // Where a size was asked for, the views of the fit are not looked at.
+    let psnr = report.pictures.as_ref().and_then(|pictures| pictures.fitted_psnr().or(pictures.psnr()));
+    let psnr = psnr.unwrap_or(0.0);
     libm::log(report.bytes.max(1) as f64 / report.gaussians.max(1) as f64) - GROWTH * psnr
 }
 

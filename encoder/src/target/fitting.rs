@@ -86,7 +86,7 @@ impl<'a> Fitting<'a> {
     /// The fit knows of coefficients only. What a codebook costs pictures beyond these, all other attributes would have to
     /// make up for with finer steps, which takes more bits than the codebook saves.
     pub(super) fn gives_up_codebook(&mut self, report: &Report, missed: f64) -> bool {
-        let has_one = report.sh_codebook_entries > 0 && self.way.sh == ShChoice::Auto;
+        let has_one = self.may_do_without_codebook(report.sh_codebook_entries);
         // Nor is it to blame for what fitting was to bring and did not.
         let by_fitting = (self.gain() - gained(report).unwrap_or(0.0)).max(0.0);
         let is_dear = has_one && missed - by_fitting > NEAR_DECIBELS;
@@ -94,6 +94,11 @@ impl<'a> Fitting<'a> {
             self.way.sh = ShChoice::Coefficients;
         }
         is_dear
+    }
+
+    /// Whether there is a codebook of so many entries, and nobody asked for it.
+    pub(super) fn may_do_without_codebook(&self, entries: u32) -> bool {
+        entries > 0 && self.way.sh == ShChoice::Auto
     }
 
     /// Settings with the steps for a PSNR: those for one that is near, all finer or coarser by the same factor, or new
