@@ -11,6 +11,7 @@ use serde::Serialize;
 use splatstream_chart::numbers::{grouped, percent};
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_format::Limits;
+use splatstream_stream::ending::complete_gops;
 use splatstream_stream::structure::{Frame, Structure};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -18,14 +19,18 @@ use std::slice;
 
 /// Write the part of a stream that an operating point needs. Nothing is decoded.
 #[derive(Args)]
-#[command(after_help = "Example:\n  splatstream extract talk.gss --op s0,t0,r1 -o talk-small.gss")]
+#[command(after_help = "Examples:\n  splatstream extract talk.gss --op s0,t0,r1 -o talk-small.gss\n  \
+    splatstream extract cut.gss --incomplete -o whole.gss  # of a stream that was cut: its complete GOPs")]
 pub(crate) struct Extract {
     /// The stream; - is standard input.
     #[arg(value_name = "IN.gss")]
     input: PathBuf,
     /// The operating point: highest spatial layer, temporal layer and refinement, counted from 0.
-    #[arg(long, value_name = "sS,tT,rR")]
-    op: OperatingPoint,
+    #[arg(long, value_name = "sS,tT,rR", required_unless_present = "incomplete")]
+    op: Option<OperatingPoint>,
+    /// Of a stream that is cut, or damaged further on: write the GOPs before that, with an end made for them.
+    #[arg(long)]
+    incomplete: bool,
     /// The stream to write; - is standard output.
     #[arg(short, long = "out", value_name = "OUT.gss")]
     out: PathBuf,
@@ -60,10 +65,14 @@ impl Extract {
         refuse_inputs(&self.out, slice::from_ref(&self.input))?;
         let stream = StreamFile::read(&self.input)?;
         let limits = self.limits.limits();
-        stream.check_point(self.op, &limits)?;
-        let extracted = extract(&stream.bytes, self.op, &limits).map_err(|error| stream.fault(error))?;
+        let point = self.op.unwrap_or_else(|| stream.highest_point(&limits));
+        stream.check_point(point, &limits)?;
+        let shortened = self.incomplete.then(|| complete_gops(&stream.bytes, &limits)).transpose();
+        let shortened = shortened.map_err(|error| stream.fault(error))?;
+        let bytes = shortened.as_ref().unwrap_or(&stream.bytes);
+        let extracted = extract(bytes, point, &limits).map_err(|error| stream.fault(error))?;
         OutputFile::write_apart(&self.out, slice::from_ref(&self.input), &extracted)?;
-        let report = Report::new(self, &stream, &extracted, &limits);
+        let report = Report::new(self, &stream, point, &extracted, &limits);
         console.report_beside(Some(&self.out), &report, || report.text())
     }
 }
@@ -77,18 +86,24 @@ fn is_damaged(frame: &Frame) -> bool {
 }
 
 impl Report {
-    fn new(command: &Extract, stream: &StreamFile, extracted: &[u8], limits: &Limits) -> Self {
+    fn new(
+        command: &Extract,
+        stream: &StreamFile,
+        point: OperatingPoint,
+        extracted: &[u8],
+        limits: &Limits,
+    ) -> Self {
         let (whole, part) = (Structure::of(&stream.bytes, limits), Structure::of(extracted, limits));
         let announced = Some(stream.frame_count_of(&whole, limits)).filter(|&count| count > 0);
         let there = frames_of(&whole).map(|frame| frame.index).collect();
         let lost = whole.missing(&there, announced, layers_of(OperatingPoint::ALL));
         let damaged: Vec<u32> =
             frames_of(&part).filter(|frame| is_damaged(frame)).map(|frame| frame.index).collect();
-        let reduced = short_frames(&stream.bytes, &whole, command.op, !lost.is_empty(), limits);
+        let reduced = short_frames(&stream.bytes, &whole, point, !lost.is_empty(), limits);
         let is_there = lost.is_empty() && damaged.is_empty() && reduced.is_empty();
         Self {
             output: command.out.clone(),
-            op: command.op.to_string(),
+            op: point.to_string(),
             bytes: extracted.len() as u64,
             bytes_in: stream.bytes.len() as u64,
             frames: frames_of(&part).count() as u32,

@@ -49,6 +49,10 @@ pub(crate) enum Instead {
     Nothing,
     /// A scene in a format that `encode` reads.
     Scene,
+    /// A file of a package.
+    Package,
+    /// A web page.
+    Page,
     /// A file without bytes.
     Empty,
 }
@@ -129,6 +133,8 @@ impl fmt::Display for Failure {
                 let advice = match instead {
                     Instead::Nothing => advice(error, *level),
                     Instead::Scene => OF_SCENE.to_owned(),
+                    Instead::Package => OF_PACKAGE.to_owned(),
+                    Instead::Page => OF_PAGE.to_owned(),
                     Instead::Empty => return write!(f, "{name}: it is empty\n  {OF_NOTHING}"),
                 };
                 write!(f, "{name}: {error}\n  {}", advice.replace("FILE", &path.to_string_lossy()))
@@ -139,6 +145,13 @@ impl fmt::Display for Failure {
 
 /// What to do with a scene that is given for a stream.
 const OF_SCENE: &str = "this is a scene, not a stream; `splatstream encode FILE -o STREAM.gss` encodes it";
+
+/// What to do with a file of a package.
+const OF_PACKAGE: &str = "this is a file of a package, not a stream; `splatstream unpackage DIR -o STREAM.gss` makes a stream of its directory";
+
+/// What to do with a web page.
+const OF_PAGE: &str =
+    "this is a web page, not a stream; one that `splatstream view` has written is opened in a browser";
 
 /// What to do with a file that has no bytes.
 const OF_NOTHING: &str = "check what wrote it, or copy it again";
@@ -158,7 +171,8 @@ fn advice(error: &Error, level: Option<u8>) -> String {
         }
         Class::OverLimit => return over_limit::advice(error, level),
         Class::Truncated => {
-            "the file is incomplete; copy it again; `splatstream decode FILE -o DIR` writes what is there"
+            "the file is incomplete; copy it again; `splatstream extract FILE --incomplete -o OUT.gss` keeps its complete GOPs, and \
+             `splatstream decode FILE -o DIR` writes what is there"
         }
     };
     by_class.to_owned()

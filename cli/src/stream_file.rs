@@ -176,6 +176,11 @@ impl StreamFile {
         SceneDescription::parse(unit.payload, unit.payload_at).ok()
     }
 
+    /// The operating point of all that the stream has.
+    pub(crate) fn highest_point(&self, limits: &Limits) -> OperatingPoint {
+        self.sequence(limits).map_or(OperatingPoint::ALL, |sequence| highest_point(&sequence))
+    }
+
     /// Refuses an operating point that the stream cannot have: it would silently be another one.
     pub(crate) fn check_point(&self, point: OperatingPoint, limits: &Limits) -> Result<(), Failure> {
         let Some(sequence) = self.sequence(limits) else {
@@ -188,16 +193,20 @@ impl StreamFile {
         {
             return Ok(());
         }
-        let last = OperatingPoint {
-            spatial: sequence.spatial_layer_count.saturating_sub(1),
-            temporal: sequence.temporal_layer_count.saturating_sub(1),
-            refinement: sequence.refinement_count.saturating_sub(1),
-        };
+        let last = highest_point(&sequence);
         let path = self.path.display();
         Err(Failure::Usage(format!(
             "{path}: there is no operating point {point}; the points go from s0,t0,r0 to {last}: \
              `splatstream inspect --ops {path}` lists them"
         )))
+    }
+}
+
+fn highest_point(sequence: &SequenceParameters) -> OperatingPoint {
+    OperatingPoint {
+        spatial: sequence.spatial_layer_count.saturating_sub(1),
+        temporal: sequence.temporal_layer_count.saturating_sub(1),
+        refinement: sequence.refinement_count.saturating_sub(1),
     }
 }
 
@@ -212,15 +221,32 @@ fn instead(path: &Path, error: &Error) -> Instead {
     match error.kind {
         ErrorKind::Signature if splatstream_files::detect(path).is_ok() => Instead::Scene,
         _ if error.at == 0 && is_empty() => Instead::Empty,
+        ErrorKind::Signature => of_start(&start_of::<16>(path).unwrap_or_default()),
         _ => Instead::Nothing,
     }
 }
 
-/// The level of the stream in a file; none of what comes by a pipe, which has gone by.
-fn level_of(path: &Path) -> Option<u8> {
-    let mut start = [0; FileHeader::SIZE];
+/// What a file is that begins with these bytes.
+fn of_start(start: &[u8; 16]) -> Instead {
+    let [_, _, _, _, kind @ .., _, _, _, _, _, _, _, _] = start;
+    match start.to_ascii_lowercase().starts_with(b"<!doctype html") {
+        true => Instead::Page,
+        false if [b"ftyp", b"styp", b"moof", b"sidx"].contains(&kind) => Instead::Package,
+        false => Instead::Nothing,
+    }
+}
+
+/// The first bytes of a file, if it has as many; of what comes by a pipe, they have gone by.
+fn start_of<const COUNT: usize>(path: &Path) -> Option<[u8; COUNT]> {
+    let mut start = [0; COUNT];
     let mut file = path.is_file().then(|| File::open(path)).and_then(Result::ok)?;
     file.read_exact(&mut start).ok()?;
+    Some(start)
+}
+
+/// The level of the stream in a file, if that is known.
+fn level_of(path: &Path) -> Option<u8> {
+    let start = start_of::<{ FileHeader::SIZE }>(path)?;
     FileHeader::parse(&start).ok().map(|(header, _)| header.level)
 }
 

@@ -15,6 +15,7 @@ mod boxes;
 pub mod client;
 pub mod control;
 pub mod division;
+pub mod ending;
 pub mod live;
 pub mod manifest;
 pub mod mpd;

@@ -4,11 +4,11 @@
 pub(crate) mod file;
 
 use crate::division::{Division, Piece};
+use crate::ending::end_here;
 use crate::representation::Representation;
 use core::fmt;
 use file::Media;
-use splatstream_format::syntax::{EndOfStream, SequenceParameters, UnitHeader, UnitId, UnitType};
-use splatstream_format::unit::Stream;
+use splatstream_format::syntax::SequenceParameters;
 use splatstream_format::{Error, ErrorKind, Limits};
 
 /// What is wrong with a file of a package.
@@ -76,44 +76,6 @@ fn put_together(files: &[(String, &[u8])], limits: &Limits, has_ended: bool) -> 
     let pieces = whole.gops.iter().flat_map(|gop| &gop.pieces);
     check_division(pieces, &samples)?;
     Ok(stream)
-}
-
-/// Ends a stream that has no end unit: with one that counts frames and units, and knows no index, since those that a stream may
-/// have come after its last GOP. Sequence parameters announce no frames any more, as not all that they announced are there.
-fn end_here(stream: &mut Vec<u8>, limits: &Limits) -> splatstream_format::Result<()> {
-    let mut end = EndOfStream { frame_count: 0, unit_count: 0, index_offset: 0 };
-    let mut changed = Vec::new();
-    let opened = Stream::open(stream, limits)?;
-    let profile = opened.header().profile();
-    let mut units = opened.units();
-    let whole = u64::try_from(stream.len()).unwrap_or(u64::MAX);
-    while let Some(unit) = units.next_unit() {
-        let unit = match unit {
-            // What is missed there is the unit that is made here.
-            Err(error) if error.at == whole => break,
-            unit => unit?,
-        };
-        let kind = unit.header.unit_type();
-        end.frame_count = end.frame_count.saturating_add(u32::from(kind == UnitType::FrameHeader));
-        end.unit_count = end.unit_count.saturating_add(1);
-        if kind == UnitType::SequenceParameters {
-            let sequence = SequenceParameters::parse_payload(unit.payload, unit.payload_at, profile)?;
-            let payload = SequenceParameters { frame_count: 0, ..sequence }.to_bytes()?;
-            changed.push((unit.at, whole_unit(kind, &payload)?));
-        }
-    }
-    for (at, bytes) in changed {
-        let place = usize::try_from(at).ok().and_then(|at| stream.get_mut(at..)?.get_mut(..bytes.len()));
-        place.into_iter().for_each(|place| place.copy_from_slice(&bytes));
-    }
-    stream.extend(whole_unit(UnitType::End, &end.to_bytes()?)?);
-    Ok(())
-}
-
-/// Header and payload of a unit that is of the whole stream.
-fn whole_unit(kind: UnitType, payload: &[u8]) -> splatstream_format::Result<Vec<u8>> {
-    let header = UnitHeader::new(UnitId::stream(kind), payload)?;
-    Ok([&header.to_bytes()?[..], payload].concat())
 }
 
 /// What the base Representation carries for all.

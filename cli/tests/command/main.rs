@@ -23,6 +23,7 @@ mod messages;
 mod missing_units;
 mod outputs;
 mod packages;
+mod parts;
 mod play;
 #[cfg(unix)]
 mod readme;
