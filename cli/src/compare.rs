@@ -26,9 +26,10 @@ use std::path::{Path, PathBuf};
 
 /// Compare two scenes or streams: the error of each attribute and, with cameras, of pictures.
 ///
-/// A and B are streams, scene files, or directories of frames; they are compared frame by frame. Both are
-/// brought into canonical form first, so that Gaussians that render alike count as alike. Every Gaussian of
-/// the smaller frame is compared with its partner in the larger one.
+/// A and B are streams, scene files, or directories of frames; they are compared frame by frame, those that only one of them has
+/// are left out. Files are frames in the order of their names; those of a directory with fewer frames than the other side are the
+/// frames that their names number, as decode writes them. Both are brought into canonical form first, so that Gaussians
+/// that render alike count as alike. Every Gaussian of the smaller frame is compared with its partner in the larger one.
 #[derive(Args)]
 #[command(after_help = "Examples:\n  splatstream compare frames/ talk.gss\n  \
     splatstream compare garden.ply garden.gss --match nearest --json\n  \
@@ -92,6 +93,7 @@ impl Compare {
             (Opened::open(&self.a, self.reading)?, Opened::open(&self.b, self.reading)?);
         let (mut frames_a, mut frames_b) =
             (opened_a.frames(&options, None)?, opened_b.frames(&options, None)?);
+        let numbered = number_by_name(&mut frames_a, &mut frames_b);
         let progress = Progress::frames("comparing", frames_a.expected().max(frames_b.expected()));
         let mut report = self.empty_report();
         let mut sums = ErrorSums::default();
@@ -118,6 +120,7 @@ impl Compare {
         report.pictures = pictures.errors();
         (report.errors_a, report.errors_b) = (frames_a.faults(), frames_b.faults());
         report.pictures.warning().into_iter().for_each(|warning| console.complain(&warning));
+        report.left_out(numbered).into_iter().for_each(|warning| console.complain(&warning));
         let notes = frames_a.warnings().into_iter().chain(frames_b.warnings());
         notes.for_each(|warning| console.complain(&warning.text()));
         console.report(&report, || report.text())?;
@@ -179,6 +182,16 @@ pub(crate) fn compare_frames(
     matching
 }
 
+/// Where one side has fewer frames, and they are files: takes them for the frames that their names number. Says which side that is.
+fn number_by_name(a: &mut Frames<'_>, b: &mut Frames<'_>) -> Option<&'static str> {
+    let (of_a, of_b) = (a.expected(), b.expected());
+    match of_a.cmp(&of_b) {
+        Ordering::Less => a.number_by_name(of_b).then_some("A"),
+        Ordering::Greater => b.number_by_name(of_a).then_some("B"),
+        Ordering::Equal => None,
+    }
+}
+
 /// Which of two frames comes first in display order; none if there is no frame.
 fn order(a: Option<&(u32, GaussianFrame)>, b: Option<&(u32, GaussianFrame)>) -> Option<Ordering> {
     match (a, b) {
@@ -196,6 +209,18 @@ fn next(frames: &mut Frames<'_>, count: &mut u32) -> Result<Option<(u32, Gaussia
 }
 
 impl Report {
+    /// What to say where a side has frames that the other one lacks. `numbered`: the side whose frames names number.
+    fn left_out(&self, numbered: Option<&str>) -> Option<String> {
+        let [a, b] = [self.frames_a, self.frames_b].map(|frames| frames.saturating_sub(self.frames));
+        let of_side = |count: u32, side: &str| {
+            (count > 0).then(|| format!("{} that only {side} has", crate::numbers::frames(count)))
+        };
+        let left_out: Vec<String> = [of_side(a, "A"), of_side(b, "B")].into_iter().flatten().collect();
+        let by_name = numbered.map(|side| format!("; frames of {side} are those that their names number"));
+        (!left_out.is_empty())
+            .then(|| format!("warning: not compared: {}{}", left_out.join(", "), by_name.unwrap_or_default()))
+    }
+
     fn text(&self) -> String {
         let side = |name, path: &Path, frames: u32, gaussians, errors: &[StreamFault]| {
             let (path, frames) = (path.display(), crate::numbers::frames(frames));

@@ -4,7 +4,7 @@ use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::input_args::{InputArgs, size_of, with_advice};
 use crate::likeness::Likeness;
-use crate::missing_frames::missing_frames;
+use crate::missing_frames::{missing_frames, numbers};
 use crate::over_limit::of_encoding;
 use crate::read_notes::ReadNotes;
 use crate::standard::STANDARD;
@@ -188,6 +188,11 @@ impl FrameFiles {
         warnings
     }
 
+    /// The numbers of the frames in the names of their files, see [`numbers`].
+    pub(crate) fn numbers(&self) -> Option<Vec<u32>> {
+        if self.sequence.is_some() { None } else { numbers(&self.paths) }
+    }
+
     /// What a frame is called in messages.
     pub(crate) fn name(&self, frame: u32) -> String {
         if let Some(sequence) = self.sequence.as_ref().filter(|_| self.spooled.is_none()) {
@@ -358,8 +363,11 @@ fn frames_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     }
 }
 
-/// The format that a name promises; none for what is no scene.
+/// The format that a name promises; none for what is no scene, and for hidden files, which systems put beside others.
 fn kind_of(path: &Path) -> Option<&'static str> {
+    if path.file_name()?.to_string_lossy().starts_with('.') {
+        return None;
+    }
     if is_sog(path) {
         return Some("sog");
     }

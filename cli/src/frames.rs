@@ -35,7 +35,12 @@ pub(crate) enum Frames<'a> {
     /// Decoded as they are asked for.
     Stream(Box<Decoding<'a>>),
     /// Read as they are asked for.
-    Files { files: Box<FrameFiles>, next: u32 },
+    Files {
+        files: Box<FrameFiles>,
+        next: u32,
+        /// Their display indices, where these are not just those of their order.
+        numbers: Option<Vec<u32>>,
+    },
 }
 
 /// A stream that is decoded frame by frame; decoding goes on after errors.
@@ -110,7 +115,17 @@ fn without_points(name: &str) -> Failure {
 impl Frames<'_> {
     /// Those of files, from the first.
     fn of_files(files: FrameFiles) -> Self {
-        Self::Files { files: Box::new(files), next: 0 }
+        Self::Files { files: Box::new(files), next: 0, numbers: None }
+    }
+
+    /// Takes the numbers in the names of files for display indices, if these are all below `end` and not those of their order
+    /// anyhow. Says whether it does.
+    pub(crate) fn number_by_name(&mut self, end: u32) -> bool {
+        let Self::Files { files, numbers, .. } = self else { return false };
+        let is_other = |found: &Vec<u32>| found.iter().zip(0..).any(|(&number, at)| number != at);
+        *numbers =
+            files.numbers().filter(|found| found.iter().all(|&number| number < end) && is_other(found));
+        numbers.is_some()
     }
 
     /// How many there should be; 0 if that is not known.
@@ -134,13 +149,15 @@ impl Frames<'_> {
     pub(crate) fn next(&mut self) -> Result<Option<(u32, GaussianFrame)>, Failure> {
         match self {
             Self::Stream(decoding) => decoding.next(),
-            Self::Files { files, next } => {
-                if *next >= files.len() {
+            Self::Files { files, next, numbers } => {
+                let place = *next;
+                if place >= files.len() {
                     return Ok(None);
                 }
-                let frame = files.frame(*next).map_err(|error| Failure::other(error.to_string()))?;
+                let frame = files.frame(place).map_err(|error| Failure::other(error.to_string()))?;
                 *next += 1;
-                Ok(Some((*next - 1, frame)))
+                let number = numbers.as_ref().and_then(|numbers| numbers.get(place as usize).copied());
+                Ok(Some((number.unwrap_or(place), frame)))
             }
         }
     }

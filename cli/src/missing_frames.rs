@@ -14,7 +14,19 @@ fn numbered(path: &Path) -> Option<(&str, u64, &str)> {
     Some((before, stem.get(before.len()..end)?.parse().ok()?, name.get(end..)?))
 }
 
-/// What to say where names that are alike but for their numbers leave some out. Numbers rise by the smallest step that at least half
+/// The numbers of frames in names that are alike but for these, if each is larger than the one before. Those of a single file, or
+/// of files that count from 1, may be anything, and are none.
+pub(crate) fn numbers(paths: &[PathBuf]) -> Option<Vec<u32>> {
+    let names: Vec<_> = paths.iter().map(|path| numbered(path)).collect::<Option<_>>()?;
+    let &(before, first, after) = names.first()?;
+    let are_alike = names.iter().all(|name| (name.0, name.2) == (before, after));
+    let are_rising = names.iter().zip(names.iter().skip(1)).all(|(a, b)| a.1 < b.1);
+    let numbers: Vec<u32> = names.iter().map(|name| u32::try_from(name.1)).collect::<Result<_, _>>().ok()?;
+    let counts_from_1 = first == 1 && numbers.iter().zip(1..).all(|(&number, at)| number == at);
+    (are_alike && are_rising && !counts_from_1 && names.len() > 1).then_some(numbers)
+}
+
+/// What to say where names that are alike but for their numbers leave some out, or have one twice. Numbers rise by the smallest step that at least half
 /// of them have; where no such step is, they are no numbers of frames. `paths` are in natural order.
 pub(crate) fn missing_frames(paths: &[PathBuf]) -> Option<Warning> {
     let names: Vec<_> = paths.iter().map(|path| numbered(path)).collect::<Option<_>>()?;
@@ -22,19 +34,28 @@ pub(crate) fn missing_frames(paths: &[PathBuf]) -> Option<Warning> {
     if names.iter().any(|name| (name.0, name.2) != (before, after)) {
         return None;
     }
+    let name = |at: usize| paths.get(at).map(|path| path.display().to_string()).unwrap_or_default();
     let pairs = || names.iter().zip(names.iter().skip(1)).map(|(a, b)| b.1.saturating_sub(a.1));
-    let step = pairs().min().filter(|&step| step > 0)?;
+    if let Some(twice) = pairs().position(|apart| apart == 0) {
+        let message = format!(
+            "{} and {} have the same number: both are frames of the sequence, and later ones are shown too late",
+            name(twice),
+            name(twice + 1)
+        );
+        return Some(Warning::new("missing-frames", message));
+    }
+    let step = pairs().min()?;
     if 2 * pairs().filter(|&other| other == step).count() < names.len().saturating_sub(1) {
         return None;
     }
     let missing = pairs().map(|apart| (apart / step).saturating_sub(1)).fold(0, u64::saturating_add);
     let gap = pairs().position(|apart| apart / step > 1)?;
-    let name = |at: usize| paths.get(at).map(|path| path.display().to_string()).unwrap_or_default();
     let message = format!(
-        "{} is followed by {}: {} of the sequence seem to be missing, and later ones are shown too early",
+        "{} is followed by {}: {} of the sequence {} to be missing, and later ones are shown too early",
         name(gap),
         name(gap + 1),
-        counted(missing, "frame")
+        counted(missing, "frame"),
+        if missing == 1 { "seems" } else { "seem" }
     );
     Some(Warning::new("missing-frames", message))
 }
@@ -53,6 +74,23 @@ mod tests {
         let text = told(&["f_0000.ply", "f_0001.ply", "f_0003.ply", "f_0006.ply", "f_0007.ply"]).unwrap();
         assert!(text.contains("f_0001.ply is followed by f_0003.ply: 3 frames"), "{text}");
         assert!(told(&["f8.spz", "f10.spz", "f12.spz", "f16.spz"]).is_some());
+    }
+
+    #[test]
+    fn numbers_are_those_of_names_that_are_alike() {
+        let of = |names: &[&str]| numbers(&names.iter().map(PathBuf::from).collect::<Vec<_>>());
+        assert_eq!(of(&["f_0004.ply", "f_0008.ply", "f_0012.ply"]), Some(vec![4, 8, 12]));
+        assert_eq!(of(&["f_0001.ply", "f_0003.ply"]), Some(vec![1, 3]));
+        assert_eq!(of(&["f_0001.ply", "f_0002.ply", "f_0003.ply"]), None);
+        assert_eq!(of(&["f_0002.ply"]), None);
+        assert_eq!(of(&["a_2.ply", "b_3.ply"]), None);
+        assert_eq!(of(&["a_2.ply", "a_02.ply"]), None);
+    }
+
+    #[test]
+    fn a_number_that_two_files_have_is_told() {
+        let text = told(&["f_0000.ply", "f_1.ply", "f_0001.ply", "f_0005.ply", "f_0006.ply"]).unwrap();
+        assert!(text.contains("f_1.ply and f_0001.ply have the same number"), "{text}");
     }
 
     #[test]
