@@ -29,7 +29,7 @@ struct Point {
     gaussians: u64,
     percent: u8,
     bpg: f64,
-    /// PSNR of the first frame in three views of 270 lines, against the highest point; null of that.
+    /// PSNR of two frames in three views of 270 lines, against the highest point; null of that.
     psnr_db: Option<f64>,
     /// Whether no point with as many frames has better pictures for as many bytes.
     on_hull: bool,
@@ -203,6 +203,7 @@ fn text(points: &[Point]) -> String {
         ]);
     }
     table.text()
-        + "\ndB: PSNR of the first frame against the highest point, mean of three views of 270 lines\n\
+        + "\ndB: PSNR against the highest point, mean of the first frame and the last of its GOP that all points have, three views of 270 \
+           lines\n\
            *: no point with as many frames looks better for as many bytes\n"
 }
