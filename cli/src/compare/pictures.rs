@@ -10,6 +10,7 @@ use serde::Serialize;
 use splatstream_chart::table::Table;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
+use splatstream_render::camera::read_views;
 use splatstream_render::metrics::{Comparison, StLpips, compare};
 use splatstream_render::{Camera, Image, Rendering, render};
 use std::path::{Path, PathBuf};
@@ -79,6 +80,9 @@ pub(super) struct Pictures<'a> {
 impl PictureArgs {
     /// Ready for the first frame; the weights are read.
     pub(super) fn start(&self, description: SceneDescription) -> Result<Pictures<'_>, Failure> {
+        if let (Some(_), Some(Views::File(path))) = (&self.photos, &self.cameras) {
+            refuse_distorted(path)?;
+        }
         let learned = self.st_lpips.as_deref().map(read_weights).transpose()?;
         let photos = [const { Vec::new() }; 2];
         Ok(Pictures {
@@ -92,6 +96,21 @@ impl PictureArgs {
             flicker: FlickerSums::default(),
             blank: 0,
         })
+    }
+}
+
+/// Refuses cameras whose lenses bend lines: pictures are drawn without that, so that photographs differ from any scene.
+fn refuse_distorted(path: &Path) -> Result<(), Failure> {
+    let failed = |error| Failure::other(format!("{}: {error}", path.display()));
+    let views = read_views(path).map_err(failed)?.views;
+    match views.iter().find(|view| view.is_distorted) {
+        None => Ok(()),
+        Some(view) => Err(Failure::other(format!(
+            "{}: the lens of {} bends straight lines, which pictures are drawn without\n  give photographs and cameras without \
+             distortion, as image_undistorter of COLMAP makes them",
+            path.display(),
+            view.camera.name
+        ))),
     }
 }
 
