@@ -6,16 +6,20 @@ use crate::likeness::Unlike;
 use crate::numbers::counted;
 use serde::Serialize;
 use splatstream_chart::numbers::{bits_per_gaussian, grouped};
-use splatstream_encoder::{Dropped, FrameReport, Isolated, Report, Settings, Size, Structure, VerifiedFrame};
+use splatstream_encoder::{
+    Dropped, FrameReport, Isolated, Preset, Report, Settings, Size, Structure, VerifiedFrame,
+};
 use splatstream_format::syntax::FrameType;
 use std::fmt::Write as _;
 
 /// A PSNR is missed by more than this in the views that steps are fitted in, decibels.
 const MISSED: f64 = 0.5;
 
-/// And by more than this in views that decide nothing, decibels: a scene of few Gaussians fills more of some pictures than of
-/// others, by which they differ.
-const MISSED_UNSEEN: f64 = 3.0;
+/// And by more than this in views that decide nothing, decibels: these differ from the others.
+const MISSED_UNSEEN: f64 = 1.0;
+
+/// From this PSNR on quantisers are about as fine as values of 16 bits can have them, decibels.
+const FINEST: f64 = 70.0;
 
 /// P and B frames may be below I frames by so much, decibels.
 const PULSE: f64 = 1.0;
@@ -66,9 +70,10 @@ pub(crate) fn warnings(
         Goal::Size(size) => warnings.extend(missed_size(report, size)),
         Goal::Nothing => {}
     }
+    warnings.extend(empty_frames(report));
     warnings.extend(pulses(report));
     warnings.extend(short_gops(report, settings));
-    warnings.extend(short_time(report, settings));
+    warnings.extend(short_time(report, settings).or_else(|| useless_fitting(report, settings)));
     warnings
 }
 
@@ -116,11 +121,12 @@ fn psnr(report: &Report, settings: &Settings, wanted: f64) -> Vec<Warning> {
         );
         return vec![Warning::new("psnr-missed", message)];
     }
-    if fitted - wanted > MISSED {
+    let least = measured.min(fitted);
+    if least - wanted > MISSED {
         let message = format!(
-            "pictures have a PSNR of {fitted:.1} dB in the views that quantisers were fitted in, {:.1} dB more than the \
-             {wanted} dB asked for; the stream is larger than it needs to be",
-            fitted - wanted
+            "pictures have a PSNR of {least:.1} dB, {:.1} dB more than the {wanted} dB asked for; the stream is larger than it \
+             needs to be",
+            least - wanted
         );
         return vec![Warning::new("psnr-exceeded", message)];
     }
@@ -149,8 +155,9 @@ fn missed_psnr_advice(report: &Report, settings: &Settings) -> &'static str {
         "pictures are compared with those of all spherical harmonics: give a higher --sh-degree"
     } else if settings.prune.is_some() {
         "what was left out counts: give a higher --prune"
-    } else if settings.psnr.is_some_and(|wanted| wanted >= *PSNR_ALLOWED.end()) {
-        "no finer quantisers can be asked for; look for Gaussians that are far larger or brighter than all others"
+    } else if settings.psnr.is_some_and(|wanted| f64::from(wanted) >= FINEST) {
+        "quantisers can hardly be finer, since values have 16 bits: look for Gaussians that are far larger or brighter than all \
+         others"
     } else {
         "give a higher --psnr, or look for Gaussians that are far larger or brighter than all others"
     }
@@ -167,12 +174,19 @@ fn missed_size(report: &Report, size: Size) -> Option<Warning> {
     if missed.abs() <= MISSED_SIZE {
         return None;
     }
+    let fitted = report.target.map_or(0.0, |target| target.fitted);
     let advice = match missed > 0.0 {
-        true => {
-            "it cannot be made smaller: leave out spherical harmonics with --sh-degree 0, use fewer layers \
-                 or refinements, or thin the scene out"
+        true if fitted <= *PSNR_ALLOWED.start() && report.sh_degree.1 > 0 => {
+            "no coarser quantisers are tried: leave out spherical harmonics with --sh-degree, use fewer layers or refinements, or \
+             thin the scene out"
         }
-        false => "finer quantisers would change nothing that can be seen",
+        true if fitted <= *PSNR_ALLOWED.start() => {
+            "no coarser quantisers are tried: use fewer layers or refinements, or thin the scene out"
+        }
+        false if f64::from(fitted) >= FINEST => "finer quantisers would change nothing that can be seen",
+        _ => {
+            "of the sizes that were tried this is the nearest, as some are leapt over: give another one, or a --psnr"
+        }
     };
     let message = format!(
         "the stream has {has:.3} {unit}, {:.1} % {} the {asked} asked for; {advice}",
@@ -180,6 +194,18 @@ fn missed_size(report: &Report, size: Size) -> Option<Warning> {
         if missed > 0.0 { "above" } else { "below" },
     );
     Some(Warning::new("size-missed", message))
+}
+
+/// Frames of a sequence in which nothing is to be seen.
+fn empty_frames(report: &Report) -> Option<Warning> {
+    let count = report.coded.iter().filter(|frame| frame.gaussians == 0).count();
+    let message = format!(
+        "{} of {} {} no Gaussians that can be seen: nothing is shown then",
+        grouped(count as u64),
+        counted(report.coded.len() as u64, "frame"),
+        if count == 1 { "has" } else { "have" },
+    );
+    (1..report.coded.len()).contains(&count).then(|| Warning::new("empty-frames", message))
 }
 
 /// Predicted frames that are worse than the I frames between them are seen as a pulse.
@@ -191,13 +217,14 @@ fn pulses(report: &Report) -> Option<Warning> {
     let (worst, of) = means.min_by(|a, b| a.0.total_cmp(&b.0))?;
     let below = intra - worst;
     let tolerance = match report.coded.iter().any(|frame| frame.by_pictures) {
-        true => "lower --tolerance, or ",
+        true => "a lower --tolerance, or ",
         false => "",
     };
     (below > PULSE).then(|| {
         let message = format!(
             "{} frames have {below:.1} dB less than I frames ({worst:.1} and {intra:.1} dB), which may be seen as a pulse \
-             at each I frame; {tolerance}code every frame by itself with --all-intra if that is seen",
+             at each I frame; if it is seen: {tolerance}--all-intra, which codes every frame by itself and takes several times as \
+             many bytes",
             of.name()
         );
         Warning::new("quality-pulses", message)
@@ -251,6 +278,16 @@ fn short_time(report: &Report, settings: &Settings) -> Option<Warning> {
         budget.as_secs_f64(),
     );
     (is_given_up || is_idle).then(|| Warning::new("nothing-fitted", message))
+}
+
+/// Fitting to pictures that was asked for, took its time, and is not in the stream.
+fn useless_fitting(report: &Report, settings: &Settings) -> Option<Warning> {
+    let is_given_up = report.target.is_some_and(|target| target.without_finetune);
+    let message = "--finetune came to nothing: at equal PSNR the stream takes fewer bytes without it, and is written without; leave \
+                   it out here, or give more iterations";
+    // What belongs to a preset nobody has asked for.
+    (is_given_up && settings.preset != Preset::Small)
+        .then(|| Warning::new("nothing-fitted", message.to_owned()))
 }
 
 fn dropped(report: &Report, first: &Dropped, file_of: &dyn Fn(u32) -> String) -> Warning {

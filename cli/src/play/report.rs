@@ -188,11 +188,18 @@ impl Report {
             }
         }
         let shown = self.played();
-        let kind = if self.quality_measured { "measured" } else { "estimated" };
+        // Estimates compare points of one GOP, and are no decibels of any picture.
+        let quality = match self.quality_measured {
+            true => format!("mean quality {:.2} dB (measured)", totals.quality_db),
+            false => {
+                format!("mean quality {:.2} (estimated; package --quality measures dB)", totals.quality_db)
+            }
+        };
+        let unit = if self.quality_measured { " dB" } else { "" };
         text += &format!(
             "{shown} of {} by the rule {}: start-up {:.3} s, {} of {:.3} s, {}\n\
-             {} in {}, {:.1} % not played; mean quality {:.2} dB ({kind})\n\
-             experience {:.2} dB, sabre {:.3}, LoL+ {:.3}\n",
+             {} in {}, {:.1} % not played; {quality}\n\
+             experience {:.2}{unit}, sabre {:.3}, LoL+ {:.3}\n",
             counted(self.gops.len() as u64, "GOP"),
             self.rule,
             totals.startup_seconds,
@@ -202,7 +209,6 @@ impl Report {
             counted(totals.bytes, "byte"),
             counted(totals.requests, "request"),
             totals.unplayed_percent,
-            totals.quality_db,
             totals.experience_db,
             totals.sabre_score,
             totals.lolp,
