@@ -6,7 +6,8 @@ use splatstream_files::{ReadLimits, SceneError, ply};
 use splatstream_render::camera::{Capture, CapturedPoint, CapturedView};
 use splatstream_render::image::ImageError;
 use splatstream_render::{Camera, Image};
-use std::io;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// Why the pictures or points of a capture cannot be used.
@@ -19,6 +20,20 @@ pub enum LoadError {
         path: PathBuf,
         /// What the system says.
         error: io::Error,
+    },
+    /// A directory, a device or a pipe, which may never end.
+    #[error("{path}: it is no regular file, and nothing else is opened for a capture; name a file", path = path.display())]
+    NoFile {
+        /// What is there.
+        path: PathBuf,
+    },
+    /// A file of more bytes than are read.
+    #[error("{path}: the file has more than {most} bytes, the most that is read; give a smaller one", path = path.display())]
+    TooLong {
+        /// The file.
+        path: PathBuf,
+        /// Bytes that it may have.
+        most: u64,
     },
     /// A file that is no picture.
     #[error("{path}: {error}", path = path.display())]
@@ -72,6 +87,9 @@ pub enum LoadError {
 /// Memory that all pictures of one capture may take: 100 of 4K, or 400 of 1080 lines.
 const MAX_BYTES: u64 = 1 << 32;
 
+/// Bytes of the longest picture or file of points that is read: 256 MiB, more than twice an 8K picture without any compression.
+const MAX_FILE: u64 = 1 << 28;
+
 /// Endings of pictures whose names lack one.
 const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "JPG", "webp"];
 
@@ -79,8 +97,8 @@ const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "JPG", "webp"];
 /// light pass, over a colour. `folder` is where to look for them instead of where the capture says.
 ///
 /// # Errors
-/// A picture that is not there, is none, or is of another shape than its camera says; lenses that are not pinholes; more than
-/// 4 GiB.
+/// A picture that is not there, is none, or is of another shape than its camera says; one that is no regular file, or a file
+/// of more than 256 MiB; lenses that are not pinholes; more than 4 GiB.
 pub fn load_photographs(
     capture: &Capture,
     folder: Option<&Path>,
@@ -114,10 +132,42 @@ fn photograph(
     }
     let picture = view.picture.as_deref().ok_or_else(|| LoadError::Unnamed(name()))?;
     let path = found(folder.unwrap_or(&capture.pictures), picture, folder.is_some());
-    let bytes = std::fs::read(&path).map_err(|error| LoadError::Io { path: path.clone(), error })?;
+    let bytes = contents(&path)?;
     let picture = Image::decoded(&bytes, background)
         .map_err(|error| LoadError::Picture { path: path.clone(), error })?;
     Photograph::new(&view.camera, &picture, height).map_err(|error| LoadError::Size { path, error })
+}
+
+/// The bytes of a file that a capture names.
+///
+/// # Errors
+/// Anything but a regular file of at most [`MAX_FILE`] bytes.
+fn contents(path: &Path) -> Result<Vec<u8>, LoadError> {
+    let mut bytes = Vec::new();
+    let file = opened(path)?;
+    file.take(MAX_FILE.saturating_add(1)).read_to_end(&mut bytes).map_err(|error| unread(path, error))?;
+    // It may have grown since it was opened.
+    match bytes.len() as u64 > MAX_FILE {
+        true => Err(LoadError::TooLong { path: path.to_path_buf(), most: MAX_FILE }),
+        false => Ok(bytes),
+    }
+}
+
+/// A file that a capture names, which may come from anybody: a device has no end, and a pipe without a writer does not even
+/// open, so what it is is asked before it is opened.
+fn opened(path: &Path) -> Result<File, LoadError> {
+    let found = std::fs::metadata(path).map_err(|error| unread(path, error))?;
+    if !found.is_file() {
+        return Err(LoadError::NoFile { path: path.to_path_buf() });
+    }
+    if found.len() > MAX_FILE {
+        return Err(LoadError::TooLong { path: path.to_path_buf(), most: MAX_FILE });
+    }
+    File::open(path).map_err(|error| unread(path, error))
+}
+
+fn unread(path: &Path, error: io::Error) -> LoadError {
+    LoadError::Io { path: path.to_path_buf(), error }
 }
 
 /// The file of a picture: as it is named, or with an ending; in a folder that was given also by its last part.
@@ -140,12 +190,12 @@ fn found(folder: &Path, name: &Path, is_given: bool) -> PathBuf {
 /// The points of a capture: those of its model, or of the PLY file that it names; none if it has neither.
 ///
 /// # Errors
-/// A file of points that cannot be read.
+/// A file of points that cannot be read, or has more than 256 MiB.
 pub fn load_points(capture: &Capture) -> Result<Vec<CapturedPoint>, LoadError> {
     let Some(path) = capture.points_file.as_ref().filter(|_| capture.points.is_empty()) else {
         return Ok(capture.points.clone());
     };
-    let bytes = std::fs::read(path).map_err(|error| LoadError::Io { path: path.clone(), error })?;
+    let bytes = contents(path)?;
     let points = ply::read_points(&bytes, &ReadLimits::default())
         .map_err(|error| LoadError::Points { path: path.clone(), error })?;
     let [x, y, z] = points.position;

@@ -145,3 +145,29 @@ fn lenses_that_bend_and_too_many_pixels_are_refused() {
     capture.views[0].camera.width = 64;
     assert!(matches!(load_photographs(&capture, None, None, [0.0; 3]), Err(LoadError::Unnamed(_))));
 }
+
+#[test]
+fn only_regular_files_that_end_soon_are_read() {
+    let (folder, _) = written();
+    let refused = |name: &str| {
+        let mut capture = read_capture(folder.path()).unwrap();
+        capture.views[1].picture = Some(name.into());
+        capture.points.clear();
+        capture.points_file = Some(folder.path().join(name));
+        let picture = load_photographs(&capture, None, None, [0.0; 3]).unwrap_err();
+        [picture, load_points(&capture).unwrap_err()]
+    };
+    // A device has no end, and a directory is no picture.
+    for name in
+        ["/dev/zero", "images"].into_iter().filter(|name| Path::new(name).exists() || !name.starts_with('/'))
+    {
+        for said in refused(name) {
+            assert!(matches!(said, LoadError::NoFile { .. }) && said.to_string().contains(name), "{said}");
+        }
+    }
+    fs::File::create(folder.path().join("long.png")).unwrap().set_len((256 << 20) + 1).unwrap();
+    for said in refused("long.png") {
+        let is_named = said.to_string().contains("long.png: the file has more than 268435456 bytes");
+        assert!(matches!(said, LoadError::TooLong { .. }) && is_named, "{said}");
+    }
+}
