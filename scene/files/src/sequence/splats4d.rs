@@ -2,7 +2,8 @@
 //!
 //! A header, a list of groups of frames in JSON, a section of what does not change, and a chunk for each group. Values are
 //! integers times a step. What a Gaussian has for the whole sequence stands in the static section; the rest is in a chunk,
-//! where the first frame of the group has values and the others differences from the frame before.
+//! where the first frame of the group has values and the others differences from the frame before. A file of more frames than it
+//! has bytes is refused.
 
 mod header;
 mod streams;

@@ -3,7 +3,10 @@
 use std::fmt::Write as _;
 use std::io::{Cursor, Write};
 
-use splatstream_files::{ReadLimits, SceneError, SceneErrorKind, ply, read_scene, sog, splat, spz};
+use splatstream_files::{
+    ReadLimits, SceneError, SceneErrorKind, SceneFormat, Sequence, SequenceOptions, ply, read_scene, sog,
+    splat, spz,
+};
 
 use super::samples::{LIMITS, small_frame};
 
@@ -72,6 +75,45 @@ fn sog_of(count: u64, width: u32, height: u32) -> Vec<u8> {
         archive.write_all(content).unwrap();
     }
     archive.finish().unwrap().into_inner()
+}
+
+/// One Gaussian of `.splat4d` that stays as it is, in one group of so many frames, and the bytes of it.
+fn splat4d_of(frames: u32) -> (usize, Result<Sequence, SceneError>) {
+    // Masks of what changes, whose first bit is 1: nothing; then positions, scales, colours, opacity and rotation.
+    let still: Vec<u8> = [1, 1, 1, 1, 1, 3, 3, 3, 1, 4]
+        .into_iter()
+        .flat_map(|count: u32| {
+            let packed = zstd(count as usize);
+            [&[0, 0, 1][..], &count.to_le_bytes(), &(packed.len() as u32).to_le_bytes(), &packed].concat()
+        })
+        .collect();
+    let json = |length: usize| {
+        let (first, last) = (12 + length, frames - 1);
+        let steps = r#""pos":1,"scale_log":1,"rgb":1,"alpha":1,"rot":1,"base_pos":1,"base_scale_log":1"#;
+        format!(
+            r#"{{"n":1,"t":{frames},"steps":{{{steps}}},"static_section":{{"offset":{first:6},"len":{}}},
+            "gops":[{{"offset":{:6},"len":2,"f0":0,"f1":{last}}}]}}"#,
+            still.len(),
+            first + still.len()
+        )
+    };
+    let json = json(json(0).len());
+    // A group of no streams.
+    let length = (json.len() as u32).to_le_bytes();
+    let file = [b"SP4D\x01\0\0\0".as_slice(), &length, json.as_bytes(), &still, &[0, 0]].concat();
+    let (size, options) = (file.len(), SequenceOptions::default());
+    (size, Sequence::of(Cursor::new(file), SceneFormat::Splat4d, "talk".as_ref(), &LIMITS, &options))
+}
+
+#[test]
+fn splat4d_has_no_more_frames_than_bytes() {
+    let (size, few) = splat4d_of(400);
+    let mut few = few.unwrap();
+    assert!(few.len() == 400 && size < 600, "{size}");
+    assert_eq!(few.frame(399).unwrap().frame.len(), 1);
+    let (size, many) = splat4d_of(u32::MAX);
+    let said = many.err().unwrap().to_string();
+    assert!(said.contains(&format!("4294967295 frames in a file of {size} bytes")), "{said}");
 }
 
 #[test]

@@ -77,7 +77,8 @@ impl Group {
 }
 
 impl Header {
-    /// Reads and checks it: sections lie in the file, and groups have each frame once, in order.
+    /// Reads and checks it: sections lie in the file, frames are not more than its bytes, and groups have each
+    /// frame once, in order.
     pub(super) fn read(source: &mut Box<dyn Source>, budget: &mut Budget) -> Result<Self, SceneError> {
         let size = source.seek(SeekFrom::End(0))?;
         source.rewind()?;
@@ -116,6 +117,13 @@ impl Header {
     }
 
     fn check(&self, size: u64) -> Result<(), SceneError> {
+        // A group in which nothing changes has no streams however many frames it says, so a few bytes could stand for frames
+        // without end. Encoders give a group a second or so, and it takes some forty bytes of the description alone.
+        if u64::from(self.frames) > size {
+            let what =
+                format!("{} frames in a file of {size} bytes, a frame takes a byte or more", self.frames);
+            return Err(broken(what));
+        }
         let lies_inside =
             |offset: u64, length: u64| offset.checked_add(length).is_some_and(|end| end <= size);
         if !lies_inside(self.still.offset, self.still.length) {
