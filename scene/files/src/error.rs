@@ -1,5 +1,6 @@
 //! What can be wrong with a scene file.
 
+use crate::printable::Printable;
 use splatstream_gaussians::{Defect, FrameError};
 use std::fmt;
 use std::io;
@@ -14,7 +15,7 @@ pub struct SceneError {
     pub kind: SceneErrorKind,
 }
 
-/// What is wrong with a scene. Byte offsets count from the start of the file, or, where the message says
+/// What is wrong with a scene. Words of the file in it, such as names, have their characters of control as escapes. Byte offsets count from the start of the file, or, where the message says
 /// so, of its decompressed content.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -96,7 +97,7 @@ pub enum SceneErrorKind {
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match &self.path {
-            Some(path) => write!(f, "{}: {}", path.display(), self.kind),
+            Some(path) => write!(f, "{}: {}", Printable(&path.to_string_lossy()), self.kind),
             None => self.kind.fmt(f),
         }
     }
@@ -116,18 +117,23 @@ impl SceneError {
     }
 
     pub(crate) fn malformed(at: usize, what: impl Into<String>, advice: &'static str) -> Self {
-        SceneErrorKind::Malformed { at: at as u64, what: what.into(), advice }.into()
+        SceneErrorKind::Malformed { at: at as u64, what: printable(what), advice }.into()
     }
 
     pub(crate) fn inconsistent(what: impl Into<String>, advice: &'static str) -> Self {
-        SceneErrorKind::Inconsistent { what: what.into(), advice }.into()
+        SceneErrorKind::Inconsistent { what: printable(what), advice }.into()
     }
 
     pub(crate) fn unsupported(what: impl Into<String>, advice: &'static str) -> Self {
-        SceneErrorKind::Unsupported { what: what.into(), advice }.into()
+        SceneErrorKind::Unsupported { what: printable(what), advice }.into()
     }
 
     pub(crate) fn truncated(at: u64, what: &'static str, needed: u64, available: u64) -> Self {
         SceneErrorKind::Truncated { at, what, needed, available }.into()
     }
+}
+
+/// What is said of a file, which may have words of the file in it.
+fn printable(what: impl Into<String>) -> String {
+    Printable(&what.into()).to_string()
 }

@@ -50,6 +50,7 @@ mod limits;
 mod members;
 mod morton;
 mod note;
+mod printable;
 mod reading;
 mod scene;
 mod scene_file;

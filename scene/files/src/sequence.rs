@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use crate::error::SceneError;
 use crate::format::{SceneFormat, detect};
 use crate::limits::{Budget, ReadLimits};
+use crate::printable::Printable;
 use crate::scene::Scene;
 use splatstream_gaussians::GaussianFrame;
 
@@ -126,10 +127,10 @@ impl Sequence {
         self.len() == 0
     }
 
-    /// What a frame is called in messages: the file, and the file in it.
+    /// What a frame is called in messages: the file, and the file in it, whose characters of control stand as their escapes.
     pub fn name(&self, frame: u32) -> String {
         match self.frames.member(frame) {
-            Some(member) => self.path.join(member).display().to_string(),
+            Some(member) => Printable(&self.path.join(member).to_string_lossy()).to_string(),
             None => format!("frame {frame} of {}", self.path.display()),
         }
     }

@@ -164,6 +164,33 @@ fn a_sog_directory_cannot_name_files_elsewhere() {
 }
 
 #[test]
+fn names_from_files_do_not_reach_terminals_as_they_are() {
+    let directory = tempfile::tempdir().unwrap();
+    let quiet = |said: String, name: &str| {
+        assert!(said.contains(name) && !said.contains(char::is_control), "{said:?}");
+    };
+    let refused = |name: &str, bytes: &[u8]| {
+        fs::write(directory.path().join(name), bytes).unwrap();
+        read_scene(&directory.path().join(name), &LIMITS).unwrap_err().to_string()
+    };
+    // A buffer that is not there, and one that is elsewhere.
+    for uri in ["\\u001b]0;a\\u0007.bin", "/\\u001b]0;a\\u0007.bin"] {
+        let text = String::from_utf8(super::gltf_files::with_data_uri(&small_frame())).unwrap();
+        let start = text.find("data:").unwrap();
+        let end = start + text[start..].find('"').unwrap();
+        quiet(
+            refused("a.gltf", [&text[..start], uri, &text[end..]].concat().as_bytes()),
+            "\\u{1b}]0;a\\u{7}.bin",
+        );
+    }
+    let named = |name: &str| meta().replace("l.webp", name);
+    quiet(refused("meta.json", named("\\u001b[2J.webp").as_bytes()), "\\u{1b}[2J.webp");
+    quiet(refused("meta.json", named("../\\u001b[2J.webp").as_bytes()), "\\u{1b}[2J.webp");
+    let error = sog::read_zip(&sog_with(&named("\\u001b[2J.webp"), 252), &LIMITS).unwrap_err();
+    quiet(error.to_string(), "\\u{1b}[2J.webp");
+}
+
+#[test]
 fn content_decides_the_format_and_errors_carry_the_path() {
     let directory = tempfile::tempdir().unwrap();
     for (name, bytes) in small_files() {

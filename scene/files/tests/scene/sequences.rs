@@ -133,6 +133,18 @@ fn what_is_wrong_with_an_archive_is_named() {
 }
 
 #[test]
+fn names_in_archives_are_shown_without_what_steers_terminals() {
+    let files = [("a\u{1b}[2J\u{202e}\u{e9}.ply".to_owned(), b"ply\nx".to_vec())];
+    for archive in [zip_of(&files), tar_of(&files)] {
+        let mut sequence = open(&archive, SceneFormat::Archive, 1).unwrap();
+        let shown = "talk/a\\u{1b}[2J\\u{202e}\u{e9}.ply";
+        assert_eq!(sequence.name(0), shown);
+        let said = sequence.frame(0).unwrap_err().to_string();
+        assert!(said.starts_with(&format!("{shown}: byte 4")), "{said:?}");
+    }
+}
+
+#[test]
 fn archives_that_stand_for_much_are_refused() {
     // 64 MiB of zeros in some ten kilobytes.
     let bomb = gzip(&tar_of(&[("a.splat".to_owned(), vec![0; 32 << 20])]));
