@@ -1,13 +1,13 @@
 //! Pictures and points of a capture, from their files.
 
-use crate::photograph::{Photograph, SizeError};
+use crate::photograph::{Photograph, SizeError, camera_of};
 use rayon::prelude::*;
 use splatstream_files::{ReadLimits, SceneError, ply};
 use splatstream_render::camera::{Capture, CapturedPoint, CapturedView};
 use splatstream_render::image::ImageError;
 use splatstream_render::{Camera, Image};
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, BufReader, Read};
 use std::path::{Path, PathBuf};
 
 /// Why the pictures or points of a capture cannot be used.
@@ -90,52 +90,115 @@ const MAX_BYTES: u64 = 1 << 32;
 /// Bytes of the longest picture or file of points that is read: 256 MiB, more than twice an 8K picture without any compression.
 const MAX_FILE: u64 = 1 << 28;
 
+/// Memory that pictures may take while they are decoded, all threads together: as much as the largest picture that is read.
+const MAX_DECODING: u64 = Image::MAX_PIXELS * Image::DECODING_BYTES;
+
 /// Endings of pictures whose names lack one.
 const ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "JPG", "webp"];
 
 /// The pictures of a capture, in the order of its views, in `height` rows if that is fewer than they have; where they let
 /// light pass, over a colour. `folder` is where to look for them instead of where the capture says.
 ///
+/// Sizes are read from the heads of all files and compared with the cameras before anything is decoded. Memory peaks at 3 bytes
+/// a pixel of the result, and 2 GiB for the pictures that are being decoded, or what the file and the decoding of one take
+/// ([`Image::decoded`]) where that is more.
+///
 /// # Errors
 /// A picture that is not there, is none, or is of another shape than its camera says; one that is no regular file, or a file
-/// of more than 256 MiB; lenses that are not pinholes; more than 4 GiB.
+/// of more than 256 MiB; one of more than [`Image::MAX_PIXELS`]; lenses that are not pinholes; more than 4 GiB.
 pub fn load_photographs(
     capture: &Capture,
     folder: Option<&Path>,
     height: Option<u32>,
     background: [f32; 3],
 ) -> Result<Vec<Photograph>, LoadError> {
-    let bytes = |view: &CapturedView| {
-        let Camera { width, height: all, .. } = view.camera;
+    within_limit(capture.views.iter().map(|view| &view.camera), height)?;
+    let found = |view| FoundPicture::find(capture, view, folder);
+    let pictures = capture.views.par_iter().map(found).collect::<Result<Vec<_>, _>>()?;
+    within_limit(pictures.iter().map(|picture| &picture.camera), height)?;
+    let mut photographs = Vec::with_capacity(pictures.len());
+    for batch in batches(&pictures) {
+        let load = |picture: &FoundPicture| picture.load(height, background);
+        photographs.append(&mut batch.par_iter().map(load).collect::<Result<Vec<_>, _>>()?);
+    }
+    Ok(photographs)
+}
+
+/// # Errors
+/// Pictures of such cameras take more than [`MAX_BYTES`].
+fn within_limit<'a>(cameras: impl Iterator<Item = &'a Camera>, height: Option<u32>) -> Result<(), LoadError> {
+    let bytes = |&Camera { width, height: all, .. }: &Camera| {
         let rows = u64::from(height.unwrap_or(all).min(all));
         let width = u64::from(width).saturating_mul(rows).div_ceil(u64::from(all.max(1)));
         width.saturating_mul(rows).saturating_mul(3)
     };
-    let bytes = capture.views.iter().map(bytes).fold(0, u64::saturating_add);
+    let bytes = cameras.map(bytes).fold(0, u64::saturating_add);
     if bytes > MAX_BYTES {
         return Err(LoadError::OverLimit { bytes, most: MAX_BYTES });
     }
-    let load = |view: &CapturedView| photograph(capture, view, folder, height, background);
-    capture.views.par_iter().map(load).collect()
+    Ok(())
 }
 
-fn photograph(
-    capture: &Capture,
-    view: &CapturedView,
-    folder: Option<&Path>,
-    height: Option<u32>,
-    background: [f32; 3],
-) -> Result<Photograph, LoadError> {
-    let name = || view.camera.name.clone();
-    if view.is_distorted {
-        return Err(LoadError::Distorted(name()));
+/// The picture of a view in its file, whose head alone was read.
+struct FoundPicture<'a> {
+    view: &'a CapturedView,
+    path: PathBuf,
+    /// In pixels of the picture.
+    camera: Camera,
+    /// Memory that its file takes, and its decoding.
+    bytes: u64,
+}
+
+impl<'a> FoundPicture<'a> {
+    /// # Errors
+    /// Those of [`load_photographs`] that can be said before a picture is decoded.
+    fn find(capture: &Capture, view: &'a CapturedView, folder: Option<&Path>) -> Result<Self, LoadError> {
+        let name = || view.camera.name.clone();
+        if view.is_distorted {
+            return Err(LoadError::Distorted(name()));
+        }
+        let picture = view.picture.as_deref().ok_or_else(|| LoadError::Unnamed(name()))?;
+        let path = found(folder.unwrap_or(&capture.pictures), picture, folder.is_some());
+        let file = opened(&path)?;
+        let length = file.metadata().map_err(|error| unread(&path, error))?.len();
+        let size = match Image::size_of_file(BufReader::new(file)) {
+            Ok(size) => size.map(|side| side as usize),
+            Err(error) => return Err(LoadError::Picture { path, error }),
+        };
+        let camera = match camera_of(&view.camera, size) {
+            Ok(camera) => camera,
+            Err(error) => return Err(LoadError::Size { path, error }),
+        };
+        let pixels = u64::from(camera.width).saturating_mul(camera.height.into());
+        let bytes = pixels.saturating_mul(Image::DECODING_BYTES).saturating_add(length);
+        Ok(Self { view, path, camera, bytes })
     }
-    let picture = view.picture.as_deref().ok_or_else(|| LoadError::Unnamed(name()))?;
-    let path = found(folder.unwrap_or(&capture.pictures), picture, folder.is_some());
-    let bytes = contents(&path)?;
-    let picture = Image::decoded(&bytes, background)
-        .map_err(|error| LoadError::Picture { path: path.clone(), error })?;
-    Photograph::new(&view.camera, &picture, height).map_err(|error| LoadError::Size { path, error })
+
+    fn load(&self, height: Option<u32>, background: [f32; 3]) -> Result<Photograph, LoadError> {
+        let path = || self.path.clone();
+        let picture = Image::decoded(&contents(&self.path)?, background)
+            .map_err(|error| LoadError::Picture { path: path(), error })?;
+        let whole = Photograph::whole(&self.view.camera, &picture)
+            .map_err(|error| LoadError::Size { path: path(), error })?;
+        // Making it smaller takes a picture of floats again: there must not be two.
+        drop(picture);
+        Ok(whole.at_most(height))
+    }
+}
+
+/// Pictures that are decoded at one time: as many as [`MAX_DECODING`] has room for, whatever the number of threads, or one.
+fn batches<'a, 'b>(mut pictures: &'b [FoundPicture<'a>]) -> impl Iterator<Item = &'b [FoundPicture<'a>]> {
+    std::iter::from_fn(move || {
+        let mut bytes = 0_u64;
+        let fits = |picture: &&FoundPicture<'_>| {
+            bytes = bytes.saturating_add(picture.bytes);
+            bytes <= MAX_DECODING
+        };
+        let count = pictures.iter().take_while(fits).count().max(1);
+        let (batch, rest) = pictures.split_at_checked(count)?;
+        pictures = rest;
+        Some(batch)
+    })
 }
 
 /// The bytes of a file that a capture names.

@@ -33,19 +33,24 @@ impl Photograph {
     /// # Errors
     /// A picture of another shape than the camera's.
     pub fn new(camera: &Camera, picture: &Image, height: Option<u32>) -> Result<Self, SizeError> {
-        let found = [picture.width(), picture.height()];
-        let camera = camera.scaled_to_height(found[1] as u32);
-        let expected = [camera.width as usize, camera.height as usize];
-        // A size that was halved may have been rounded either way.
-        if found[0].abs_diff(expected[0]) > 1 {
-            return Err(SizeError { name: camera.name, found, expected });
+        Ok(Self::whole(camera, picture)?.at_most(height))
+    }
+
+    /// A picture in its own rows.
+    ///
+    /// # Errors
+    /// As [`Photograph::new`].
+    pub(crate) fn whole(camera: &Camera, picture: &Image) -> Result<Self, SizeError> {
+        let camera = camera_of(camera, [picture.width(), picture.height()])?;
+        Ok(Self { pixels: bytes(picture), camera })
+    }
+
+    /// The same view in `height` rows, or in its own if those are fewer.
+    pub(crate) fn at_most(self, height: Option<u32>) -> Self {
+        match height.filter(|&height| height < self.camera.height) {
+            Some(height) => self.smaller(height),
+            None => self,
         }
-        let camera = Camera { width: found[0] as u32, ..camera };
-        let photograph = Self { pixels: bytes(picture), camera };
-        Ok(match height.filter(|&height| height < photograph.camera.height) {
-            Some(height) => photograph.smaller(height),
-            None => photograph,
-        })
     }
 
     /// From where it was taken, in pixels of this picture.
@@ -74,6 +79,20 @@ impl Photograph {
     pub fn psnr(&self, frame: &PreparedFrame<'_>, background: [f32; 3]) -> f64 {
         psnr(&self.picture(), &frame.draw(&self.camera, background).rendering().colour)
     }
+}
+
+/// The camera of a picture of so many pixels, of which nothing else needs to be known.
+///
+/// # Errors
+/// As [`Photograph::new`].
+pub(crate) fn camera_of(camera: &Camera, found: [usize; 2]) -> Result<Camera, SizeError> {
+    let camera = camera.scaled_to_height(found[1] as u32);
+    let expected = [camera.width as usize, camera.height as usize];
+    // A size that was halved may have been rounded either way.
+    if found[0].abs_diff(expected[0]) > 1 {
+        return Err(SizeError { name: camera.name, found, expected });
+    }
+    Ok(Camera { width: found[0] as u32, ..camera })
 }
 
 /// The nearest levels.

@@ -171,3 +171,22 @@ fn only_regular_files_that_end_soon_are_read() {
         assert!(matches!(said, LoadError::TooLong { .. }) && is_named, "{said}");
     }
 }
+
+#[test]
+fn pictures_are_compared_with_cameras_before_they_are_decoded() {
+    let (folder, cameras) = written();
+    let path = folder.path().join("images/view_001.png");
+    let load = || load_photographs(&read_capture(folder.path()).unwrap(), None, None, [0.0; 3]).unwrap_err();
+    // Of another shape, and damaged after its head: the shape is what is said.
+    let mut square = SIMULATION.picture(&cameras[1], 0.2).averaged(36, 36).to_png().unwrap();
+    square.truncate(50);
+    fs::write(&path, square).unwrap();
+    let said = load();
+    assert!(matches!(said, LoadError::Size { .. }) && said.to_string().contains("[36, 36]"), "{said}");
+    // Of the right shape, damaged there.
+    let mut cut = fs::read(folder.path().join("images/view_002.png")).unwrap();
+    cut.truncate(cut.len() / 2);
+    fs::write(&path, cut).unwrap();
+    let said = load();
+    assert!(matches!(said, LoadError::Picture { .. }) && said.to_string().contains("view_001"), "{said}");
+}

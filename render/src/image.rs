@@ -1,7 +1,7 @@
 //! Pictures, and PNG files.
 
-use ::image::{ImageFormat, ImageReader, RgbImage};
-use std::io::Cursor;
+use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, RgbImage};
+use std::io::{BufRead, Cursor, Seek};
 
 /// A picture: red, green, blue as `f32`, row by row from the top left. 0 is black and 1 the brightest that a
 /// file holds; a rendering may go above.
@@ -20,9 +20,24 @@ pub enum ImageError {
     /// The file could not be read.
     #[error("cannot read: {0}")]
     Io(#[from] std::io::Error),
+    /// More pixels than are decoded.
+    #[error("the picture has {width} x {height} pixels, at most {most} are read; give a smaller one", most = Image::MAX_PIXELS)]
+    TooLarge {
+        /// Pixels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
 }
 
 impl Image {
+    /// Pixels that a picture may have to be decoded: 134 million, four times 8K.
+    pub const MAX_PIXELS: u64 = 1 << 27;
+
+    /// Bytes of memory that decoding takes for each pixel: the picture as it is decoded, at most 4, and as `f32`, 12. The file
+    /// and what its decoder keeps for itself come on top.
+    pub const DECODING_BYTES: u64 = 16;
+
     /// A picture of `pixels`, `width` to a row.
     ///
     /// # Panics
@@ -90,12 +105,24 @@ impl Image {
         Ok(file.into_inner())
     }
 
+    /// Width and height of the picture in a file, of which no more than its head is read where the format has one.
+    ///
+    /// # Errors
+    /// Bytes that are no PNG, JPEG or WebP file; more than [`Image::MAX_PIXELS`].
+    pub fn size_of_file(file: impl BufRead + Seek) -> Result<[u32; 2], ImageError> {
+        let (width, height) = ImageReader::new(file).with_guessed_format()?.into_decoder()?.dimensions();
+        match u64::from(width).saturating_mul(height.into()) > Self::MAX_PIXELS {
+            true => Err(ImageError::TooLarge { width, height }),
+            false => Ok([width, height]),
+        }
+    }
+
     /// The picture in a PNG file; alpha is dropped, 16 bits become 8.
     ///
     /// # Errors
-    /// Bytes that are no PNG file.
+    /// Bytes that are no PNG file; otherwise as [`Image::decoded`], whose memory it takes.
     pub fn from_png(bytes: &[u8]) -> Result<Self, ImageError> {
-        let picture = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?.decode()?.to_rgb8();
+        let picture = opened(bytes)?.into_rgb8();
         let pixels = picture.pixels().map(|pixel| pixel.0.map(|byte| f32::from(byte) / 255.0)).collect();
         Ok(Self::new((picture.width() as usize).max(1), pixels))
     }
@@ -103,19 +130,39 @@ impl Image {
     /// The picture in a PNG, JPEG or WebP file, over one colour where it lets light pass, in the values of the file. 16 bits
     /// become 8. What a JPEG file holds may differ by a level from one version of its decoder to another.
     ///
+    /// Memory peaks at [`Image::DECODING_BYTES`] a pixel, 2 GiB for the largest picture that is read; 12 bytes of them stay. The
+    /// bytes of the file and what the decoder keeps while it works are not among them.
+    ///
     /// # Errors
-    /// Bytes that are no such file, or a picture that takes more than 512 MiB of memory.
+    /// Bytes that are no such file; a picture of more than [`Image::MAX_PIXELS`], which is refused before it is decoded, or of
+    /// more than 512 MiB as the file has it, such as 16 bits for each of four channels.
     pub fn decoded(bytes: &[u8], background: [f32; 3]) -> Result<Self, ImageError> {
-        let picture = ImageReader::new(Cursor::new(bytes)).with_guessed_format()?.decode()?.to_rgba8();
         let over = |[r, g, b, a]: [u8; 4]| {
             let [r, g, b, alpha] = [r, g, b, a].map(|byte| f32::from(byte) / 255.0);
             let [back_r, back_g, back_b] = background;
             [[r, back_r], [g, back_g], [b, back_b]]
                 .map(|[own, back]| if a == 255 { own } else { back + (own - back) * alpha })
         };
-        let pixels = picture.pixels().map(|pixel| over(pixel.0)).collect();
-        Ok(Self::new((picture.width() as usize).max(1), pixels))
+        // Most pictures have three channels: a fourth would be one more copy of the whole picture.
+        let (width, pixels) = match opened(bytes)? {
+            DynamicImage::ImageRgb8(picture) => {
+                let pixels =
+                    picture.pixels().map(|pixel| pixel.0.map(|byte| f32::from(byte) / 255.0)).collect();
+                (picture.width(), pixels)
+            }
+            other => {
+                let picture = other.into_rgba8();
+                (picture.width(), picture.pixels().map(|pixel| over(pixel.0)).collect())
+            }
+        };
+        Ok(Self::new((width as usize).max(1), pixels))
     }
+}
+
+/// The picture of a file as the file has it, if it has no more pixels than are read.
+fn opened(bytes: &[u8]) -> Result<DynamicImage, ImageError> {
+    Image::size_of_file(Cursor::new(bytes))?;
+    Ok(ImageReader::new(Cursor::new(bytes)).with_guessed_format()?.decode()?)
 }
 
 /// The pixels that one of `to` pixels on an axis covers of `from`, and their shares in its mean.
@@ -155,6 +202,38 @@ mod tests {
             );
         }
         assert!(Image::decoded(b"no picture", [0.0; 3]).unwrap_err().to_string().contains("JPEG"));
+    }
+
+    #[test]
+    fn pictures_of_too_many_pixels_are_refused_by_their_head() {
+        // A PNG file that ends after its head and the first bytes of its pixels: decoding it would fail otherwise.
+        let head = |width: u32, height: u32| {
+            let small = Image::new(1, vec![[0.5; 3]]).to_png().unwrap();
+            let [width, height] = [width, height].map(u32::to_be_bytes);
+            let kind = [b"IHDR", &width[..], &height, &small[24..29]].concat();
+            let check = crc32fast::hash(&kind).to_be_bytes();
+            [&small[..12], &kind, &check, &small[33..]].concat()
+        };
+        let size = |width, height| Image::size_of_file(Cursor::new(head(width, height)));
+        assert_eq!(size(16_384, 8192).unwrap(), [16_384, 8192]);
+        let said = size(13_300, 13_296).unwrap_err().to_string();
+        assert!(said.contains("13300 x 13296 pixels, at most 134217728"), "{said}");
+        let bytes = head(16_384, 8193);
+        for refused in [Image::decoded(&bytes, [0.0; 3]), Image::from_png(&bytes)] {
+            assert!(matches!(refused, Err(ImageError::TooLarge { width: 16_384, height: 8193 })));
+        }
+    }
+
+    #[test]
+    fn pictures_of_other_channels_are_read_too() {
+        let mut file = Cursor::new(Vec::new());
+        let grey =
+            ::image::ImageBuffer::<::image::Luma<u16>, _>::from_raw(2, 1, vec![0_u16, 0xffff]).unwrap();
+        grey.write_to(&mut file, ImageFormat::Png).unwrap();
+        let bytes = file.into_inner();
+        for read in [Image::decoded(&bytes, [0.5; 3]).unwrap(), Image::from_png(&bytes).unwrap()] {
+            assert_eq!(read.pixels(), [[0.0; 3], [1.0; 3]]);
+        }
     }
 
     #[test]
