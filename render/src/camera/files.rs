@@ -35,6 +35,12 @@ pub enum CameraError {
         /// What is wrong and what to do.
         why: &'static str,
     },
+    /// More cameras in a JSON file than are read.
+    #[error("there are more than {most} cameras: give a part of the file")]
+    TooMany {
+        /// Cameras that are read at most.
+        most: usize,
+    },
     /// A file of COLMAP that is not one.
     #[error("{file}: {place}: {why}")]
     Colmap {
@@ -86,6 +92,9 @@ pub struct CapturedPoint {
     pub colour: [u8; 3],
 }
 
+/// Views that are read at most, and lenses.
+const MAX_VIEWS: usize = 100_000;
+
 /// The largest file of cameras in JSON, bytes.
 const MAX_JSON: u64 = 1 << 26;
 
@@ -108,7 +117,8 @@ pub fn read_views(path: &Path) -> Result<Capture, CameraError> {
 /// What was captured: of a `cameras.json`, a `transforms.json`, or a directory that has a `transforms.json` or a model of
 /// COLMAP in itself, in its `sparse/0` or in its `sparse`.
 ///
-/// Pictures are neither opened nor looked for. At most 100,000 views and 10,000,000 points are read, and nothing else is
+/// Pictures are neither opened nor looked for. Sides of pictures are 1 to 16,384 pixels: whoever draws for cameras of strangers
+/// must reckon with the 5 GB that a drawing of that size takes, or scale them ([`Camera::scaled_to_height`]). At most 100,000 views and 10,000,000 points are read, and nothing else is
 /// kept of a model, whatever its size.
 ///
 /// # Errors

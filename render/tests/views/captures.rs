@@ -233,3 +233,62 @@ fn a_directory_without_cameras_says_what_it_lacks() {
     assert!(refused(folder.path()).contains("sparse/0"));
     assert!(refused(&folder.path().join("none.json")).contains("check the path"));
 }
+
+#[test]
+fn cameras_in_json_are_read_up_to_a_limit() {
+    let trainer =
+        r#"{"width":64,"height":32,"fx":50,"fy":50,"position":[1,2,3],"rotation":[[1,0,0],[0,1,0],[0,0,1]]}"#;
+    let frame = r#"{"transform_matrix":[[1,0,0,1],[0,-1,0,2],[0,0,-1,3],[0,0,0,1]]}"#;
+    let list = |element: &str, count: usize| vec![element; count].join(",");
+    let files = |count: usize| {
+        let cameras = format!("[{}]", list(trainer, count));
+        let transforms = format!(r#"{{"frames":[{}],"w":64,"h":32,"fl_x":50}}"#, list(frame, count));
+        folder(&[("cameras.json", cameras.as_bytes()), ("transforms.json", transforms.as_bytes())])
+    };
+    let (most, more) = (files(100_000), files(100_001));
+    for name in ["cameras.json", "transforms.json"] {
+        assert_eq!(read_cameras(&most.path().join(name)).unwrap().len(), 100_000);
+        let said = refused(&more.path().join(name));
+        assert_eq!(said, "there are more than 100000 cameras: give a part of the file");
+    }
+}
+
+/// Keys that are not known hold anything, keys that are known come in any order, and the last of two counts.
+#[test]
+fn objects_of_json_are_read_in_any_order() {
+    let text = r#" {"applied_transform": [[1, {"deep": [null, "x"]}]], "frames": [{"colmap_im_id": {"a": [1]}, "cx": null,
+        "w": 10, "transform_matrix": [[1, 0, 0, 1, 9], [0, -1, 0, 2], [0, 0, -1, 3], []], "w": 80}],
+        "camera_model": "PINHOLE", "h": 32, "fl_\u0078": 50, "w": 64}"#;
+    let folder = folder(&[("transforms.json", text.as_bytes())]);
+    let camera = &read_cameras(folder.path()).unwrap()[0];
+    assert_eq!(
+        (camera.width, camera.height, camera.focal, camera.position),
+        (80, 32, [50.0; 2], [1.0, 2.0, 3.0])
+    );
+}
+
+#[test]
+fn json_of_another_form_says_what_lacks() {
+    let cases = [
+        (r#"{"w": 1}"#, "missing field `frames`"),
+        (r#"{"frames": [{"w": 1}]}"#, "missing field `transform_matrix`"),
+        (
+            r#"{"frames": [{"transform_matrix": []}], "w": 1, "h": 1, "fl_x": 1}"#,
+            "transform_matrix has no rows",
+        ),
+        (
+            r#"{"frames": [{"transform_matrix": [[1], [2]]}], "w": 1, "h": 1, "fl_x": 1}"#,
+            "4 rows of 4 numbers",
+        ),
+        (r#"{"frames": [{"transform_matrix": [["1"]]}]}"#, "expected f32"),
+        (r#"[{"width": 64}]"#, "missing field `height`"),
+        (r#"{"frames": []} x"#, "trailing characters"),
+        (r#""text""#, "neither a cameras.json"),
+        ("[", "EOF"),
+    ];
+    for (text, expected) in cases {
+        let folder = folder(&[("a.json", text.as_bytes())]);
+        let said = refused(&folder.path().join("a.json"));
+        assert!(said.contains(expected), "{text}: {said}");
+    }
+}

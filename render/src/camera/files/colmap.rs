@@ -7,16 +7,13 @@
 mod binary;
 mod text;
 
-use super::{CameraError, Capture, CapturedPoint, CapturedView};
+use super::{CameraError, Capture, CapturedPoint, CapturedView, MAX_VIEWS};
 use crate::camera::Camera;
 use glam::{DMat3, DQuat, DVec3};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
-
-/// Views that are read at most, and lenses.
-const MAX_VIEWS: usize = 100_000;
 
 /// Points that are read at most.
 const MAX_POINTS: usize = 10_000_000;

@@ -1,32 +1,39 @@
 //! The `cameras.json` of INRIA's trainer, and nerfstudio's, instant-ngp's and Blender's `transforms.json`.
+//!
+//! What is read goes straight into what is kept of it, and what is not known is not kept: a tree of the whole file, or a copy of
+//! what a flattened structure does not know, takes up to ninety times its bytes.
 
-use super::{CameraError, Capture, CapturedView};
+mod reading;
+
+use super::{CameraError, Capture, CapturedView, MAX_VIEWS};
 use crate::camera::Camera;
-use serde::Deserialize;
+use reading::{Limited, Matrix, Object, Taken};
+use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess};
 use std::path::{Path, PathBuf};
 
 /// What the bytes of a file in `folder` say.
 ///
 /// # Errors
-/// Neither of the two forms, or a camera without size, focal length or pose.
+/// Neither of the two forms, more than [`MAX_VIEWS`] cameras, or a camera without size, focal length or pose.
 pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<Capture, CameraError> {
-    let value: serde_json::Value = serde_json::from_slice(bytes)?;
-    if value.is_array() {
-        let cameras: Vec<TrainerCamera> = serde_json::from_value(value)?;
+    if bytes.iter().find(|byte| !byte.is_ascii_whitespace()) == Some(&b'[') {
+        let cameras: Limited<TrainerCamera> = serde_json::from_slice(bytes)?;
+        let cameras = cameras.all().ok_or(CameraError::TooMany { most: MAX_VIEWS })?;
         let views = cameras.into_iter().enumerate().map(|(at, camera)| camera.view(at)).collect();
         return Ok(Capture { views, pictures: folder.join("images"), ..Capture::default() });
     }
-    let transforms: Transforms = serde_json::from_value(value)?;
+    let transforms: Transforms = serde_json::from_slice(bytes)?;
+    let points_file = transforms.ply_file_path.as_ref().map(|file| folder.join(file));
     Ok(Capture {
         views: transforms.views()?,
-        points_file: transforms.ply_file_path.as_ref().map(|file| folder.join(file)),
+        points_file,
         pictures: folder.to_path_buf(),
         points: Vec::new(),
     })
 }
 
 /// A camera of INRIA's `cameras.json`: `rotation` and `position` lead from the camera to the world.
-#[derive(Deserialize)]
+#[derive(serde::Deserialize)]
 struct TrainerCamera {
     img_name: Option<String>,
     width: u32,
@@ -53,16 +60,36 @@ impl TrainerCamera {
 }
 
 /// `transforms.json`. Intrinsics stand in the file or with a frame, which wins.
-#[derive(Deserialize)]
+#[derive(Default)]
 struct Transforms {
-    #[serde(flatten)]
     intrinsics: Intrinsics,
-    frames: Vec<TransformFrame>,
+    frames: Option<Limited<TransformFrame>>,
     /// Points of nerfstudio: a PLY file beside this one.
     ply_file_path: Option<String>,
 }
 
-#[derive(Deserialize, Clone)]
+impl Taken for Transforms {
+    fn take<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<(), A::Error> {
+        match key {
+            "frames" => self.frames = Some(map.next_value()?),
+            "ply_file_path" => self.ply_file_path = map.next_value()?,
+            _ => self.intrinsics.take(key, map)?,
+        }
+        Ok(())
+    }
+
+    fn missing(&self) -> Option<&'static str> {
+        self.frames.is_none().then_some("frames")
+    }
+}
+
+impl<'de> Deserialize<'de> for Transforms {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Object::new("transforms"))
+    }
+}
+
+#[derive(Default)]
 struct Intrinsics {
     w: Option<f64>,
     h: Option<f64>,
@@ -80,6 +107,31 @@ struct Intrinsics {
     k4: Option<f64>,
     p1: Option<f64>,
     p2: Option<f64>,
+}
+
+impl Taken for Intrinsics {
+    fn take<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<(), A::Error> {
+        match key {
+            "w" => self.w = map.next_value()?,
+            "h" => self.h = map.next_value()?,
+            "fl_x" => self.fl_x = map.next_value()?,
+            "fl_y" => self.fl_y = map.next_value()?,
+            "cx" => self.cx = map.next_value()?,
+            "cy" => self.cy = map.next_value()?,
+            "camera_angle_x" => self.camera_angle_x = map.next_value()?,
+            "camera_angle_y" => self.camera_angle_y = map.next_value()?,
+            "camera_model" => self.camera_model = map.next_value()?,
+            "is_fisheye" => self.is_fisheye = map.next_value()?,
+            "k1" => self.k1 = map.next_value()?,
+            "k2" => self.k2 = map.next_value()?,
+            "k3" => self.k3 = map.next_value()?,
+            "k4" => self.k4 = map.next_value()?,
+            "p1" => self.p1 = map.next_value()?,
+            "p2" => self.p2 = map.next_value()?,
+            _ => drop(map.next_value::<IgnoredAny>()?),
+        }
+        Ok(())
+    }
 }
 
 impl Intrinsics {
@@ -106,30 +158,52 @@ impl Intrinsics {
     }
 }
 
-#[derive(Deserialize)]
+#[derive(Default)]
 struct TransformFrame {
     file_path: Option<String>,
-    transform_matrix: Vec<Vec<f32>>,
-    #[serde(flatten)]
+    transform_matrix: Option<Matrix>,
     intrinsics: Intrinsics,
+}
+
+impl Taken for TransformFrame {
+    fn take<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<(), A::Error> {
+        match key {
+            "file_path" => self.file_path = map.next_value()?,
+            "transform_matrix" => self.transform_matrix = Some(map.next_value()?),
+            _ => self.intrinsics.take(key, map)?,
+        }
+        Ok(())
+    }
+
+    fn missing(&self) -> Option<&'static str> {
+        self.transform_matrix.is_none().then_some("transform_matrix")
+    }
+}
+
+impl<'de> Deserialize<'de> for TransformFrame {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Object::new("a frame"))
+    }
 }
 
 /// The side of the pictures of NeRF-synthetic, pixels.
 const NERF_SYNTHETIC_SIDE: f64 = 800.0;
 
 impl Transforms {
-    fn views(&self) -> Result<Vec<CapturedView>, CameraError> {
+    fn views(self) -> Result<Vec<CapturedView>, CameraError> {
         let shared = &self.intrinsics;
-        let view = |(at, frame): (usize, &TransformFrame)| {
+        let frames = self.frames.unwrap_or_default().all();
+        let frames = frames.ok_or(CameraError::TooMany { most: MAX_VIEWS })?;
+        let view = |(at, frame): (usize, TransformFrame)| {
             let refused = |why| CameraError::Camera { camera: at, why };
             shared.check_model().and_then(|()| frame.intrinsics.check_model()).map_err(refused)?;
             Ok(CapturedView {
                 camera: frame.camera(shared, at).map_err(refused)?,
-                picture: frame.file_path.as_ref().map(PathBuf::from),
                 is_distorted: shared.is_distorted() || frame.intrinsics.is_distorted(),
+                picture: frame.file_path.map(PathBuf::from),
             })
         };
-        self.frames.iter().enumerate().map(view).collect()
+        frames.into_iter().enumerate().map(view).collect()
     }
 }
 
@@ -151,11 +225,7 @@ impl TransformFrame {
         let from_height = of_angle(own.camera_angle_y.or(shared.camera_angle_y), height);
         let focal_x = own.fl_x.or(shared.fl_x).or(from_angle);
         let focal_x = focal_x.ok_or("there is no focal length: add fl_x or camera_angle_x to the file")?;
-        let [rows @ .., _] = self.transform_matrix.as_slice() else {
-            return Err("transform_matrix has no rows: it must have 4");
-        };
-        let [right, up, back, position] =
-            columns(rows).ok_or("transform_matrix must have 4 rows of 4 numbers")?;
+        let [right, up, back, position] = self.transform_matrix.unwrap_or_default().columns()?;
         Ok(Camera {
             name: self
                 .file_path
@@ -174,16 +244,6 @@ impl TransformFrame {
             position,
         })
     }
-}
-
-/// The columns of the first three rows of a 4 x 4 matrix.
-fn columns(rows: &[Vec<f32>]) -> Option<[[f32; 3]; 4]> {
-    let [x, y, z] = rows else { return None };
-    let mut columns = [[0.0; 3]; 4];
-    for (column, values) in columns.iter_mut().enumerate() {
-        *values = [*x.get(column)?, *y.get(column)?, *z.get(column)?];
-    }
-    Some(columns)
 }
 
 #[expect(clippy::indexing_slicing, reason = "columns are 0, 1 and 2")]
