@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// A file could not be read.
-    #[error("{path}: cannot read: {error}; check the path", path = path.display())]
+    #[error("{path}: cannot read: {error}; check the path", path = shown(path))]
     Io {
         /// The file.
         path: PathBuf,
@@ -22,13 +22,13 @@ pub enum LoadError {
         error: io::Error,
     },
     /// A directory, a device or a pipe, which may never end.
-    #[error("{path}: it is no regular file, and nothing else is opened for a capture; name a file", path = path.display())]
+    #[error("{path}: it is no regular file, and nothing else is opened for a capture; name a file", path = shown(path))]
     NoFile {
         /// What is there.
         path: PathBuf,
     },
     /// A file of more bytes than are read.
-    #[error("{path}: the file has more than {most} bytes, the most that is read; give a smaller one", path = path.display())]
+    #[error("{path}: the file has more than {most} bytes, the most that is read; give a smaller one", path = shown(path))]
     TooLong {
         /// The file.
         path: PathBuf,
@@ -36,7 +36,7 @@ pub enum LoadError {
         most: u64,
     },
     /// A file that is no picture.
-    #[error("{path}: {error}", path = path.display())]
+    #[error("{path}: {error}", path = shown(path))]
     Picture {
         /// The file.
         path: PathBuf,
@@ -44,7 +44,7 @@ pub enum LoadError {
         error: ImageError,
     },
     /// A picture of another shape than its camera's.
-    #[error("{path}: {error}", path = path.display())]
+    #[error("{path}: {error}", path = shown(path))]
     Size {
         /// The file.
         path: PathBuf,
@@ -52,7 +52,7 @@ pub enum LoadError {
         error: SizeError,
     },
     /// Points that cannot be read.
-    #[error("{path}: {error}", path = path.display())]
+    #[error("{path}: {error}", path = shown(path))]
     Points {
         /// The file.
         path: PathBuf,
@@ -82,6 +82,14 @@ pub enum LoadError {
         /// Bytes that they may.
         most: u64,
     },
+}
+
+/// A path as messages show it: it may come from a file of anybody, and terminals obey characters of control.
+fn shown(path: &Path) -> String {
+    let text = path.to_string_lossy();
+    text.chars()
+        .map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() })
+        .collect()
 }
 
 /// Memory that all pictures of one capture may take: 100 of 4K, or 400 of 1080 lines.

@@ -190,3 +190,13 @@ fn pictures_are_compared_with_cameras_before_they_are_decoded() {
     let said = load();
     assert!(matches!(said, LoadError::Picture { .. }) && said.to_string().contains("view_001"), "{said}");
 }
+
+#[test]
+fn names_from_captures_do_not_reach_terminals_as_they_are() {
+    let (folder, _) = written();
+    let mut capture = read_capture(folder.path()).unwrap();
+    capture.points.clear();
+    capture.points_file = Some(folder.path().join("\u{1b}[2J.ply"));
+    let said = load_points(&capture).unwrap_err().to_string();
+    assert!(said.contains("\\u{1b}[2J.ply: cannot read") && !said.contains('\u{1b}'), "{said:?}");
+}

@@ -159,7 +159,10 @@ fn cameras_of(capture: Capture) -> Vec<Camera> {
 }
 
 fn checked(capture: Capture) -> Result<Capture, CameraError> {
-    capture.views.iter().enumerate().try_for_each(|(at, view)| check(at, &view.camera))?;
+    capture.views.iter().enumerate().try_for_each(|(at, view)| {
+        check(at, &view.camera)?;
+        check_names(at, view)
+    })?;
     Ok(capture)
 }
 
@@ -188,6 +191,19 @@ fn check(at: usize, camera: &Camera) -> Result<(), CameraError> {
         return why("the rotation must have rows of length 1");
     }
     Ok(())
+}
+
+/// Names go into messages and onto terminals, which obey characters of control; no program writes them into names.
+fn check_names(at: usize, view: &CapturedView) -> Result<(), CameraError> {
+    let picture = view.picture.as_ref().map(|picture| picture.to_string_lossy());
+    let steers = |name: &str| name.contains(char::is_control);
+    match steers(&view.camera.name) || picture.as_deref().is_some_and(steers) {
+        true => {
+            let why = "the name of its picture has characters of control: rename it";
+            Err(CameraError::Camera { camera: at, why })
+        }
+        false => Ok(()),
+    }
 }
 
 #[cfg(test)]

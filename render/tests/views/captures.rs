@@ -292,3 +292,26 @@ fn json_of_another_form_says_what_lacks() {
         assert!(said.contains(expected), "{text}: {said}");
     }
 }
+
+#[test]
+fn characters_of_control_in_names_are_refused_and_not_repeated() {
+    let trainer = br#"[{"img_name": "a\u001b[2J.png", "width": 64, "height": 32, "fx": 50, "fy": 50, "position": [1, 2, 3],
+        "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]"#;
+    let json = folder(&[("cameras.json", trainer)]);
+    let image = "4 1 0 0 0 -1 -2 -3 1 a\u{1b}[2J.png\n\n";
+    let cases = [
+        (
+            refused(&json.path().join("cameras.json")),
+            "camera 0: the name of its picture has characters of control",
+        ),
+        (refused(text(CAMERAS, image, POINTS).path()), "camera 0: the name of its picture"),
+        (refused(text("1 \u{1b}[2J 64 48 50\n", IMAGES, POINTS).path()), "\\u{1b}[2J is no model"),
+        (
+            refused(text("2 PINHOLE 64 48 50 50 32 24\n", image, POINTS).path()),
+            "a\\u{1b}[2J.png: there is no camera 1",
+        ),
+    ];
+    for (said, expected) in cases {
+        assert!(said.contains(expected) && !said.contains('\u{1b}'), "{said:?}");
+    }
+}

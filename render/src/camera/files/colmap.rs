@@ -157,10 +157,9 @@ struct Pose {
 impl Pose {
     #[expect(clippy::arithmetic_side_effects, reason = "products of matrices of floats")]
     fn view(self, lenses: &BTreeMap<u32, Lens>, model: &Model) -> Result<CapturedView, CameraError> {
-        let refused = |why: String| CameraError::Colmap {
-            file: format!("images.{}", model.ending()),
-            place: self.place.clone(),
-            why: format!("{}: {why}", self.name),
+        let refused = |why: String| {
+            let file = format!("images.{}", model.ending());
+            colmap_error(file, self.place.clone(), &format!("{}: {why}", self.name))
         };
         let lens = lenses.get(&self.lens);
         let lens = lens.ok_or_else(|| refused(format!("there is no camera {} in cameras", self.lens)))?;
@@ -185,6 +184,18 @@ impl Pose {
         let picture = Some(PathBuf::from(&self.name));
         Ok(CapturedView { camera, picture, is_distorted: lens.is_distorted })
     }
+}
+
+/// What is wrong with a file of a model. `why` may have words of the file, of which terminals must not obey any.
+fn colmap_error(file: String, place: String, why: &str) -> CameraError {
+    let why = why.chars().fold(String::new(), |mut shown, c| {
+        match c.is_control() {
+            true => shown.extend(c.escape_default()),
+            false => shown.push(c),
+        }
+        shown
+    });
+    CameraError::Colmap { file, place, why }
 }
 
 /// # Errors

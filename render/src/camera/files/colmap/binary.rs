@@ -1,8 +1,8 @@
 //! Models as bytes, little endian.
 
 use super::{
-    CameraError, CapturedPoint, Lens, MAX_PARAMETERS, MAX_POINTS, MAX_VIEWS, MODELS, Pose, Source, point,
-    room,
+    CameraError, CapturedPoint, Lens, MAX_PARAMETERS, MAX_POINTS, MAX_VIEWS, MODELS, Pose, Source,
+    colmap_error, point, room,
 };
 use std::collections::BTreeMap;
 use std::io::{BufRead, Read};
@@ -153,6 +153,6 @@ impl Bytes {
     }
 
     fn refused(&self, at: u64, why: String) -> CameraError {
-        CameraError::Colmap { file: self.source.name.clone(), place: format!("byte {at}"), why }
+        colmap_error(self.source.name.clone(), format!("byte {at}"), &why)
     }
 }

@@ -1,8 +1,8 @@
 //! Models as text.
 
 use super::{
-    CameraError, CapturedPoint, Lens, MAX_PARAMETERS, MAX_POINTS, MAX_VIEWS, MODELS, Pose, Source, point,
-    room,
+    CameraError, CapturedPoint, Lens, MAX_PARAMETERS, MAX_POINTS, MAX_VIEWS, MODELS, Pose, Source,
+    colmap_error, point, room,
 };
 use std::collections::BTreeMap;
 use std::io::{BufRead, Read};
@@ -139,6 +139,6 @@ impl Lines {
     }
 
     fn refused(&self, why: String) -> CameraError {
-        CameraError::Colmap { file: self.source.name.clone(), place: self.place(), why }
+        colmap_error(self.source.name.clone(), self.place(), &why)
     }
 }
