@@ -18,8 +18,8 @@ fn raised(error: PyErr) -> io::Error {
     io::Error::other(error)
 }
 
-fn wrong(what: &str) -> io::Error {
-    io::Error::new(ErrorKind::InvalidData, what)
+fn wrong(what: impl Into<String>) -> io::Error {
+    io::Error::new(ErrorKind::InvalidData, what.into())
 }
 
 impl Read for FileObject {
@@ -66,7 +66,11 @@ impl Write for FileObject {
             if written.is_none() {
                 return Ok(bytes.len());
             }
-            written.extract().map_err(raised)
+            let count: Option<usize> = written.extract().ok();
+            count.filter(|&count| count <= bytes.len()).ok_or_else(|| {
+                let found = written.repr().map(|text| text.to_string()).unwrap_or_default();
+                wrong(format!("write() returned {found} and was given {} bytes", bytes.len()))
+            })
         })
     }
 

@@ -253,6 +253,18 @@ def test_errors_of_a_file_object_are_raised_as_they_are(frames: list[gss.Gaussia
         gss.encode(frames[0], Full(), preset="fast")
 
 
+@pytest.mark.parametrize("count", [-1, 10**9, 2**70, "all", 1.5])
+def test_a_write_that_returns_no_number_of_its_bytes_is_an_error(frames: list[gss.Gaussians], count: object) -> None:
+    class Boasting(io.BytesIO):
+        def write(self, data: Any) -> Any:
+            return count
+
+    with pytest.raises(OSError, match=rf"write\(\) returned {re.escape(repr(count))} and was given \d+ bytes"):
+        gss.encode(frames[0], Boasting(), preset="fast")
+    with pytest.raises(OSError, match="was given"), gss.Encoder(Boasting(), preset="fast") as encoder:
+        encoder.push(frames[0])
+
+
 def test_other_threads_run_meanwhile(frames: list[gss.Gaussians]) -> None:
     ticks = 0
     done = threading.Event()
