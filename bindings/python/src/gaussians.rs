@@ -4,7 +4,7 @@ use crate::arrays::{Attributes, attribute, dictionary, interleaved, owned, share
 use crate::errors::scene_error;
 use numpy::ndarray::{ArrayView1, Dim};
 use numpy::{Element, PyArray1, PyArray2, PyArray3};
-use pyo3::exceptions::PyIndexError;
+use pyo3::exceptions::{PyIndexError, PyOverflowError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyTuple};
@@ -87,6 +87,20 @@ impl Gaussians {
         match &self.source {
             Source::Given(_) => None,
             Source::Decoded(frame) => Some(frame),
+        }
+    }
+
+    /// The index of a Gaussian, as Python gives it.
+    fn index(&self, index: &Bound<'_, PyAny>) -> PyResult<u32> {
+        let count = self.count();
+        match index.extract::<u32>() {
+            Ok(index) if (index as usize) < count => Ok(index),
+            Err(error) if !error.is_instance_of::<PyOverflowError>(index.py()) => Err(error),
+            _ => {
+                let last = count.checked_sub(1).map(|last| format!(", with indices from 0 to {last}"));
+                let range = last.unwrap_or_default();
+                Err(PyIndexError::new_err(format!("index {index}: there are {count} Gaussians{range}")))
+            }
         }
     }
 
@@ -188,11 +202,11 @@ impl Gaussians {
     ///
     /// Args:
     ///     indices: Integers from 0 to len(self) - 1; one may come more than once.
-    fn select(&self, py: Python<'_>, indices: Vec<u32>) -> PyResult<Self> {
-        let count = self.count();
-        if let Some(index) = indices.iter().find(|&&index| index as usize >= count) {
-            return Err(PyIndexError::new_err(format!("index {index}: there are {count} Gaussians")));
-        }
+    ///
+    /// Raises:
+    ///     IndexError: An integer that is no such index.
+    fn select(&self, py: Python<'_>, indices: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let indices = indices.try_iter()?.map(|index| self.index(&index?)).collect::<PyResult<Vec<u32>>>()?;
         Ok(Self::new(Source::Given(py.detach(|| self.values().select(&indices)))))
     }
 

@@ -103,6 +103,14 @@ def test_selecting() -> None:
     assert np.array_equal(some.position, one.position[[7, 0, 7]])
     with pytest.raises(IndexError, match="index 10: there are 10 Gaussians"):
         one.select([10])
+    for index in (-1, 2**32, 2**70, -(2**70)):
+        with pytest.raises(IndexError, match=f"index {index}: there are 10 Gaussians, with indices from 0 to 9"):
+            one.select([0, index])
+    with pytest.raises(IndexError, match="index 0: there are 0 Gaussians$"):
+        one.select([]).select([0])
+    with pytest.raises(TypeError):
+        one.select([1.0])  # type: ignore[list-item]
+    assert np.array_equal(one.select(np.array([3, 1])).position, one.position[[3, 1]])
 
 
 def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
