@@ -21,8 +21,8 @@ use std::path::PathBuf;
 ///     position: (N, 3): x right, y down, z forward, in the unit of the scene.
 ///     log_scale: (N, 3): natural logarithm of the semi-axes.
 ///     rotation: (N, 4): quaternions w, x, y, z of any length above 0.
-///     opacity_logit: (N,): opacity before the sigmoid.
-///     dc: (N, 3): the first coefficient of red, green and blue; colour = 0.5 + 0.2821 dc.
+///     opacity_logit: (N,), or (N, 1) as some trainers keep it: opacity before the sigmoid.
+///     dc: (N, 3), or (N, 1, 3) as well: the first coefficient of red, green and blue; colour = 0.5 + 0.2821 dc.
 ///     sh: (N, K, 3): the other coefficients, K = 3, 8 or 15 for degree 1, 2 or 3.
 ///     antialiased: Whether opacities were fitted for a renderer that makes up for its low-pass filter.
 ///

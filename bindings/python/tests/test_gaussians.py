@@ -30,6 +30,9 @@ def test_anything_that_numpy_takes_makes_a_frame() -> None:
     assert np.allclose(gss.Gaussians(**doubles).position, arrays["position"])
     columns = {**arrays, "opacity_logit": arrays["opacity_logit"][:, None], "dc": arrays["dc"][:, None, :]}
     assert np.array_equal(gss.Gaussians(**columns).dc, arrays["dc"])
+    assert np.array_equal(gss.Gaussians(**columns).opacity_logit, arrays["opacity_logit"])
+    # As it is said.
+    assert "(N, 1)" in (gss.Gaussians.__doc__ or "")
     fortran = {**arrays, "position": np.asfortranarray(arrays["position"])}
     assert np.array_equal(gss.Gaussians(**fortran).position, arrays["position"])
     assert gss.Gaussians(**{**arrays, "sh": None}).sh.shape == (4, 0, 3)
