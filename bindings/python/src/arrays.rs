@@ -59,6 +59,11 @@ fn floats<'py>(values: &Bound<'py, PyAny>, name: &str) -> PyResult<PyReadonlyArr
         false => values.clone(),
     };
     let numpy = py.import("numpy")?;
+    if values.hasattr("mask")? && numpy.getattr("ma")?.call_method1("is_masked", (&values,))?.is_truthy()? {
+        return Err(PyValueError::new_err(format!(
+            "{name} has masked values: fill them, or leave their rows out of all arrays"
+        )));
+    }
     let keywords = PyDict::new(py);
     keywords.set_item("dtype", numpy.getattr("float32")?)?;
     let array = numpy.call_method("ascontiguousarray", (values,), Some(&keywords));

@@ -142,6 +142,19 @@ def test_the_point_changes_while_decoding(talk: Path) -> None:
     assert first is not None and later and all(len(frame) < len(first) for frame in later)
 
 
+def test_what_is_no_point_and_no_range_is_said(talk: Path) -> None:
+    with pytest.raises(ValueError, match=r"is \(256, 0, 0\), and its numbers go from 0 to 255"):
+        gss.decode(talk, op=(256, 0, 0))
+    with pytest.raises(ValueError, match=r"is \(0, -1, 0\), and its numbers"):
+        gss.Decoder(talk).set_operating_point((0, -1, 0))
+    for point in ((0, 0), 3, (0.5, 0, 0)):
+        with pytest.raises(TypeError, match=r"operating point is .*: write it as \"s0,t0,r2\" or \(0, 0, 2\)"):
+            gss.decode(talk, op=point)  # type: ignore[arg-type]
+    for frames in (5, [1, 2], "1:2"):
+        with pytest.raises(TypeError, match=r"frames is .*: give a range or a slice, as range\(5, 6\)"):
+            gss.decode(talk, frames=frames)  # type: ignore[arg-type]
+
+
 def test_some_frames(talk: Path) -> None:
     def of(frames: range | slice) -> list[int]:
         return [frame.index for frame in gss.decode(talk, frames=frames)]

@@ -100,6 +100,21 @@ def test_arrays_of_words_are_refused() -> None:
         gss.encode([1])  # type: ignore[list-item]
 
 
+@pytest.mark.parametrize("name", ["position", "opacity_logit", "sh"])
+def test_masked_values_are_refused(name: str) -> None:
+    arrays = moving(0, count=4, degree=1)
+    masked = np.ma.masked_array(arrays[name], mask=np.zeros(arrays[name].shape, bool))
+    # Nothing is masked.
+    assert np.array_equal(getattr(gss.Gaussians(**{**arrays, name: masked}), name), arrays[name])
+    masked[2] = np.ma.masked
+    with pytest.raises(ValueError, match=f"{name} has masked values"):
+        gss.Gaussians(**{**arrays, name: masked})
+    trained = {"position": "means", "opacity_logit": "opacities", "sh": "shN"}
+    own = {"log_scale": "scales", "rotation": "quats", "dc": "sh0", **trained}
+    with pytest.raises(ValueError, match=f"{name} has masked values"):
+        gss.from_splats({own[key]: masked if key == name else values for key, values in arrays.items()})
+
+
 def test_selecting() -> None:
     one = gss.Gaussians(**moving(0, count=10))
     some = one.select([7, 0, 7])

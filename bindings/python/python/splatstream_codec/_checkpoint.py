@@ -121,7 +121,8 @@ def from_splats(splats: Any, *, antialiased: bool = False) -> Gaussians:
 def _array(values: ArrayLike | Any) -> np.ndarray[Any, np.dtype[Any]]:
     if hasattr(values, "detach"):
         values = values.detach().cpu()
-    return np.asarray(values)
+    # Masked arrays stay what they are: masked values are refused, not taken.
+    return values if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
 
 
 def as_gaussians(frame: Any) -> Gaussians:

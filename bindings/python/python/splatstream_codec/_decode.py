@@ -55,6 +55,8 @@ def decode(
 def _wanted(frames: range | slice | None) -> range:
     """The frames asked for as a range that goes up."""
     frames = slice(None) if frames is None else frames
+    if not isinstance(frames, (range, slice)):
+        raise TypeError(f"frames is {frames!r}: give a range or a slice, as range(5, 6) for frame 5 or slice(10, None)")
     start, step = frames.start or 0, 1 if frames.step is None else frames.step
     # Indices have 32 bits.
     stop = 1 << 32 if frames.stop is None else frames.stop
