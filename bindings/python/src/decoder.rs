@@ -5,7 +5,7 @@ use crate::file_object::FileObject;
 use crate::frame::Frame;
 use crate::limits::Limits;
 use crate::operating_point::{self, Point};
-use crate::work;
+use crate::work::{self, Guard, Shared};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -14,7 +14,6 @@ use splatstream::scene::UpAxis;
 use splatstream::{Cancel, Position};
 use std::io::Cursor;
 use std::path::PathBuf;
-use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
 /// Decodes a stream, frame by frame: an iterator of frames.
@@ -25,6 +24,9 @@ use std::time::Duration;
 ///     op: The operating point, as "s0,t1,r2" or (0, 1, 2); everything by default.
 ///     limits: What the stream may take.
 ///     ahead: Decode two frames at a time where neither needs the other: more frames a second, the first one later.
+///
+/// Threads may share a decoder: a call waits until that of another thread is done. A file object cannot use the decoder that
+/// reads from it: that is an Error (kind "in-use").
 ///
 /// Example:
 ///     >>> for frame in gss.Decoder("talk.gss"):
@@ -41,7 +43,7 @@ use std::time::Duration;
 ///     >>> for frame in decoder:
 ///     ...     show(frame)
 #[pyclass(frozen, module = "splatstream_codec")]
-pub(crate) struct Decoder(Mutex<State>);
+pub(crate) struct Decoder(Shared<State>);
 
 struct State {
     decoder: splatstream::Decoder,
@@ -84,8 +86,8 @@ fn bytes_of(object: &Bound<'_, PyAny>) -> PyResult<PyBackedBytes> {
 }
 
 impl Decoder {
-    fn state(&self, py: Python<'_>) -> PyResult<MutexGuard<'_, State>> {
-        work::locked(py, &self.0)
+    fn state(&self, py: Python<'_>) -> PyResult<Guard<'_, State>> {
+        self.0.lock(py)
     }
 
     /// Does something with the decoder that takes time.
@@ -128,7 +130,7 @@ impl Decoder {
         }
         let cancel = Cancel::new();
         decoder.set_cancel(cancel.clone());
-        Ok(Self(Mutex::new(State { decoder, cancel, last: None })))
+        Ok(Self(Shared::new("decoder", State { decoder, cancel, last: None })))
     }
 
     /// Takes the next bytes of the stream, any number of them. Those that are no longer needed are dropped as frames are

@@ -3,15 +3,15 @@
 use crate::errors::encode_error;
 use crate::gaussians::Gaussians;
 use crate::sink::{Sink, Written};
-use crate::work;
+use crate::work::{self, Shared};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use splatstream::{Cancel, EncodeError, FrameSource, GaussianFrame, Report};
 use splatstream_cli::{EncodeOptions, OptionsError, Prepared};
 use std::io::Write;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
 /// What the package makes a result of: the bytes, if they were not written elsewhere, and a report in JSON.
@@ -54,7 +54,7 @@ fn teller<'a>(
 /// Encodes frames as they come: each GOP is written once its frames are there, and one more.
 #[pyclass(frozen, module = "splatstream_codec._native")]
 pub(crate) struct Encoder {
-    state: Mutex<State>,
+    state: Shared<State>,
     start: Instant,
     written: Option<Written>,
     cancel: Cancel,
@@ -167,7 +167,7 @@ impl Encoder {
         let options = Box::new(EncodeOptions::parse(options).map_err(wrong_options)?);
         let (sink, written) = Sink::of(out)?;
         Ok(Self {
-            state: Mutex::new(State::Waiting { options, sink, first: None }),
+            state: Shared::new("encoder", State::Waiting { options, sink, first: None }),
             start: Instant::now(),
             written,
             cancel: Cancel::new(),
@@ -179,7 +179,7 @@ impl Encoder {
     /// Takes the next frame, and codes the GOP that it completes.
     fn push(&self, py: Python<'_>, frame: &Bound<'_, Gaussians>) -> PyResult<()> {
         let frame = frame.get();
-        let mut state = work::locked(py, &self.state)?;
+        let mut state = self.state.lock(py)?;
         let before = std::mem::replace(&mut *state, State::Ended);
         let mut told = teller(self.progress.as_ref(), &self.coded, None);
         let after = work::run(py, &self.cancel, &mut told, || self.take(before, frame.values().clone()))?;
@@ -189,7 +189,7 @@ impl Encoder {
 
     /// Codes the rest, and ends the stream.
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<Encoded<'py>> {
-        let mut state = work::locked(py, &self.state)?;
+        let mut state = self.state.lock(py)?;
         let before = std::mem::replace(&mut *state, State::Ended);
         let mut told = teller(self.progress.as_ref(), &self.coded, None);
         let done = work::run(py, &self.cancel, &mut told, || self.end(before))?;

@@ -89,8 +89,13 @@ pub(crate) fn decode_error(py: Python<'_>, error: Error, frame: Option<u32>) -> 
             exception(py, "IncompleteError", message, fields())
         }
         Error::Io(error) => os_error(error, None),
-        _ => exception(py, "Error", message, [("kind", decoder_kind(&error))].into_py_dict(py)),
+        _ => call_error(py, message, decoder_kind(&error)),
     }
+}
+
+/// The exception for a call that cannot be answered, whatever the stream is.
+pub(crate) fn call_error(py: Python<'_>, message: String, kind: &str) -> PyErr {
+    exception(py, "Error", message, [("kind", kind)].into_py_dict(py))
 }
 
 /// What is wrong with a call, of errors that are not those of a stream.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +41,13 @@ def moving(number: int, count: int = 300, degree: int = 0) -> Arrays:
         "dc": random.normal(0.0, 1.0, (count, 3)).astype(np.float32),
         "sh": random.normal(0.0, 0.1, (count, (degree + 1) ** 2 - 1, 3)).astype(np.float32),
     }
+
+
+def output_of(program: str) -> str:
+    """What a program prints that hangs if it is wrong, and then has to be killed: no signal ends it."""
+    start = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+    words = [sys.executable, "-c", start + textwrap.dedent(program)]
+    return subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True, timeout=60).stdout
 
 
 @pytest.fixture(scope="session")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import output_of
 
 import splatstream_codec as gss
 
@@ -326,6 +327,101 @@ def test_threads_may_share_a_decoder(talk: Path) -> None:
     for thread in threads:
         thread.join()
     assert sorted(found) == list(range(12))
+
+
+@pytest.mark.parametrize("call", ["next_frame()", "seek(0)", "is_finished", "highest_point"])
+def test_a_file_object_cannot_use_the_decoder_that_reads_it(talk: Path, call: str) -> None:
+    program = f"""
+        import io
+        import splatstream_codec as gss
+
+        class File(io.BytesIO):
+            def read(self, size=-1):
+                decoder.{call}
+                return super().read(size)
+
+        with open({str(talk)!r}, "rb") as file:
+            decoder = gss.Decoder(File(file.read()))
+        try:
+            decoder.next_frame()
+        except gss.Error as error:
+            print(error.kind, error)
+    """
+    assert output_of(program).startswith("in-use the decoder is in use by the call that runs this code")
+
+
+def test_decoders_that_read_each_other_are_refused_and_others_are_not(talk: Path) -> None:
+    program = f"""
+        import io
+        import splatstream_codec as gss
+
+        class File(io.BytesIO):
+            other = None
+
+            def read(self, size=-1):
+                if self.other is not None:
+                    self.other.next_frame()
+                return super().read(size)
+
+        def pair():
+            with open({str(talk)!r}, "rb") as file:
+                data = file.read()
+            files = [File(data), File(data)]
+            return files, [gss.Decoder(file) for file in files]
+
+        files, decoders = pair()
+        files[0].other = decoders[1]
+        print(decoders[0].next_frame().index)
+
+        files, decoders = pair()
+        files[0].other, files[1].other = decoders[1], decoders[0]
+        try:
+            decoders[0].next_frame()
+        except gss.Error as error:
+            print(error.kind)
+        files[0].other = None
+        decoders[0].seek(0)
+        print(decoders[0].next_frame().index)
+    """
+    assert output_of(program).split() == ["0", "in-use", "0"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of Unix")
+def test_ctrl_c_ends_a_call_whose_file_object_waits_for_another_decoder(talk: Path) -> None:
+    program = f"""
+        import io, os, signal, threading
+        import splatstream_codec as gss
+
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        reads, goes_on = threading.Event(), threading.Event()
+
+        class Slow(io.BytesIO):
+            def read(self, size=-1):
+                reads.set()
+                goes_on.wait()
+                return super().read(size)
+
+        class Waiting(io.BytesIO):
+            def read(self, size=-1):
+                threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+                slow.next_frame()
+                return super().read(size)
+
+        with open({str(talk)!r}, "rb") as file:
+            data = file.read()
+        slow, waiting = gss.Decoder(Slow(data)), gss.Decoder(Waiting(data))
+        thread = threading.Thread(target=slow.next_frame)
+        thread.start()
+        reads.wait()
+        try:
+            waiting.next_frame()
+        except KeyboardInterrupt:
+            print("interrupted")
+        goes_on.set()
+        thread.join()
+        print(slow.next_frame().index)
+    """
+    assert output_of(program).split() == ["interrupted", "1"]
 
 
 def test_what_the_stream_says_of_its_scene(frames: list[gss.Gaussians]) -> None:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import moving
+from conftest import moving, output_of
 
 import splatstream_codec as gss
 from splatstream_codec import EncodeOptions
@@ -263,6 +263,68 @@ def test_a_write_that_returns_no_number_of_its_bytes_is_an_error(frames: list[gs
         gss.encode(frames[0], Boasting(), preset="fast")
     with pytest.raises(OSError, match="was given"), gss.Encoder(Boasting(), preset="fast") as encoder:
         encoder.push(frames[0])
+
+
+@pytest.mark.parametrize("call", ["push(frame)", "finish()"])
+def test_a_progress_function_cannot_use_its_encoder(call: str) -> None:
+    program = f"""
+        import splatstream_codec as gss
+        from conftest import moving
+
+        frame = gss.Gaussians(**moving(0, count=40))
+        encoder = gss.Encoder(progress=lambda *_: encoder.{call}, preset="fast", gop=1)
+        try:
+            for _ in range(4):
+                encoder.push(frame)
+        except gss.Error as error:
+            print(error.kind, error)
+    """
+    assert output_of(program).startswith("in-use the encoder is in use by the call that runs this code")
+
+
+def test_a_progress_function_that_is_refused_does_not_end_the_stream(tmp_path: Path) -> None:
+    out = tmp_path / "out.gss"
+    program = f"""
+        import splatstream_codec as gss
+        from conftest import moving
+
+        refused = set()
+
+        def progress(*_):
+            try:
+                encoder.finish()
+            except gss.Error as error:
+                refused.add(error.kind)
+
+        encoder = gss.Encoder({str(out)!r}, progress=progress, preset="fast", gop=1)
+        for number in range(4):
+            encoder.push(moving(number, count=40))
+        encoder.finish()
+        print(*refused)
+    """
+    assert output_of(program).split() == ["in-use"]
+    assert len(list(gss.decode(out))) == 4
+
+
+def test_a_file_object_cannot_use_the_encoder_that_writes_to_it() -> None:
+    program = """
+        import io
+        import splatstream_codec as gss
+        from conftest import moving
+
+        class File(io.BytesIO):
+            def write(self, data):
+                encoder.push(moving(0, count=40))
+                return super().write(data)
+
+        encoder = gss.Encoder(File(), preset="fast", gop=1)
+        try:
+            for number in range(4):
+                encoder.push(moving(number, count=40))
+        except gss.Error as error:
+            print(error.kind)
+    """
+    assert output_of(program).split() == ["in-use"]
 
 
 def test_other_threads_run_meanwhile(frames: list[gss.Gaussians]) -> None:

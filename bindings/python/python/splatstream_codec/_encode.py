@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Callable, Optional, TypedDict, 
 
 from . import _native
 from ._checkpoint import as_gaussians
+from ._errors import Error
 from ._native import Gaussians
 from ._types import OperatingPoint
 
@@ -220,7 +221,8 @@ class Encoder:
 
     Args:
         out: A path, which appears when the stream is whole, or a file object; without it the result has the bytes.
-        progress: Called with the number of frames that are coded, and None.
+        progress: Called with the number of frames that are coded, and None. It cannot use the encoder, and neither can a
+            file object that is written to: that is an Error (kind "in-use").
         options: See `EncodeOptions`.
 
     Example:
@@ -255,8 +257,10 @@ class Encoder:
         """Codes the rest, and ends the stream."""
         try:
             data, report = self._encoder.finish()
-        except BaseException:
-            self._whole.discard()
+        except BaseException as error:
+            # The call that has the encoder still writes.
+            if not (isinstance(error, Error) and error.kind == "in-use"):
+                self._whole.discard()
             raise
         self._whole.keep()
         self._result = _result(data, report)

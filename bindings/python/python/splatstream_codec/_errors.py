@@ -13,7 +13,8 @@ class Error(Exception):
 
     Attributes:
         kind: What is wrong, as a stable word. Of this class itself: "not-pushed", "not-seekable", "too-much-input",
-            "too-few-slots".
+            "too-few-slots"; "in-use" where a file object or a progress function uses the decoder or encoder that calls it;
+            "cancelled" where the call that runs them was ended by Ctrl-C.
     """
 
     kind: str
