@@ -10,7 +10,8 @@ import numpy as np
 
 import splatstream_codec as gss
 
-frames = list(gss.decode(sys.argv[1], op="s0,t0,r2"))
+# The lowest layers with all refinements.
+frames = list(gss.decode(sys.argv[1], op="s0,t0,r255"))
 figure, axes = plt.subplots(1, len(frames), figsize=(3 * len(frames), 3), squeeze=False, sharex=True, sharey=True)
 for axis, frame in zip(axes[0], frames):
     # Far ones first; y points down, as in pictures.

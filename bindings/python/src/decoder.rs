@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict, PyMemoryView};
 use splatstream::scene::UpAxis;
-use splatstream::{Cancel, Position};
+use splatstream::{Cancel, OperatingPoint, Position};
 use std::io::Cursor;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -21,7 +21,7 @@ use std::time::Duration;
 /// Args:
 ///     source: A path, bytes, or a file object in binary mode that can seek; it is read as it is needed. Without it,
 ///         bytes are pushed.
-///     op: The operating point, as "s0,t1,r2" or (0, 1, 2); everything by default.
+///     op: The operating point, as "s0,t1,r2" or (0, 1, 2), where 255 is all that there is; everything by default.
 ///     limits: What the stream may take.
 ///     ahead: Decode two frames at a time where neither needs the other: more frames a second, the first one later.
 ///
@@ -50,6 +50,36 @@ struct State {
     cancel: Cancel,
     /// The last frame that was given out.
     last: Option<u32>,
+    /// An operating point that was asked for, until it is known that the stream has it.
+    unchecked: Option<OperatingPoint>,
+    /// A frame that was decoded before that was known.
+    held: Option<splatstream::Frame>,
+}
+
+impl State {
+    /// Why the stream has no such operating point as was asked for; none while that is not known.
+    fn refused(&mut self) -> Option<PyErr> {
+        let (point, highest) = (self.unchecked?, self.decoder.highest_point()?);
+        let refused = operating_point::refused(point, highest);
+        self.unchecked = self.unchecked.filter(|_| refused.is_some());
+        refused
+    }
+
+    /// The next frame, once the operating point that was asked for is one of the stream.
+    fn next_frame(&mut self) -> splatstream::Result<PyResult<Option<splatstream::Frame>>> {
+        if self.held.is_none() {
+            self.held = match self.refused() {
+                Some(refused) => return Ok(Err(refused)),
+                None => self.decoder.next_frame()?,
+            };
+        }
+        if let Some(refused) = self.refused() {
+            return Ok(Err(refused));
+        }
+        let frame = self.held.take();
+        self.last = frame.as_ref().map(splatstream::Frame::index).or(self.last);
+        Ok(Ok(frame))
+    }
 }
 
 /// A decoder of what Python names.
@@ -94,17 +124,18 @@ impl Decoder {
     fn work<T: Send>(
         &self,
         py: Python<'_>,
-        call: impl FnOnce(&mut splatstream::Decoder, &mut Option<u32>) -> splatstream::Result<T> + Send,
+        call: impl FnOnce(&mut State) -> splatstream::Result<T> + Send,
     ) -> PyResult<T> {
         let mut state = self.state(py)?;
-        let State { decoder, cancel, last } = &mut *state;
-        let done = work::run(py, cancel, &mut |_| Ok(()), || call(decoder, last));
+        let state = &mut *state;
+        let cancel = state.cancel.clone();
+        let done = work::run(py, &cancel, &mut |_| Ok(()), || call(state));
         if cancel.is_requested() {
             // A seek starts again.
-            *cancel = Cancel::new();
-            decoder.set_cancel(cancel.clone());
+            state.cancel = Cancel::new();
+            state.decoder.set_cancel(state.cancel.clone());
         }
-        done?.map_err(|error| decode_error(py, error, *last))
+        done?.map_err(|error| decode_error(py, error, state.last))
     }
 }
 
@@ -122,7 +153,8 @@ impl Decoder {
         if let Some(limits) = limits {
             decoder = decoder.with_limits(limits.into());
         }
-        if let Some(Point(point)) = op {
+        let unchecked = op.map(|Point(point)| point);
+        if let Some(point) = unchecked {
             decoder = decoder.with_operating_point(point);
         }
         if ahead {
@@ -130,7 +162,7 @@ impl Decoder {
         }
         let cancel = Cancel::new();
         decoder.set_cancel(cancel.clone());
-        Ok(Self(Shared::new("decoder", State { decoder, cancel, last: None })))
+        Ok(Self(Shared::new("decoder", State { decoder, cancel, last: None, unchecked, held: None })))
     }
 
     /// Takes the next bytes of the stream, any number of them. Those that are no longer needed are dropped as frames are
@@ -155,16 +187,14 @@ impl Decoder {
     /// The next frame. None if more bytes have to come, or after the last one: see `is_finished`.
     ///
     /// Raises:
+    ///     ValueError: The stream has fewer layers or refinements than the operating point; says the highest. No frame is
+    ///         lost: set a point that the stream has, and go on.
     ///     StreamError: The stream cannot be decoded at all, or not within the limits.
     ///     IncompleteError: Once, after the last frame: something was missing or damaged there. Damage otherwise costs
     ///         frames; their warnings tell.
     ///     KeyboardInterrupt: Ctrl-C ended it; a seek starts again.
     fn next_frame(&self, py: Python<'_>) -> PyResult<Option<Py<Frame>>> {
-        let frame = self.work(py, |decoder, last| {
-            let frame = decoder.next_frame()?;
-            *last = frame.as_ref().map(splatstream::Frame::index).or(*last);
-            Ok(frame)
-        })?;
+        let frame = self.work(py, State::next_frame)??;
         frame.map(|frame| Frame::new(py, frame)).transpose()
     }
 
@@ -192,22 +222,36 @@ impl Decoder {
             ),
             _ => return Err(PyTypeError::new_err("seek() takes a frame or a time")),
         };
-        self.work(py, |decoder, last| {
-            *last = None;
-            decoder.seek(to)
+        self.work(py, |state| {
+            state.last = None;
+            state.decoder.seek(to)?;
+            state.held = None;
+            Ok(())
         })
     }
 
     /// Changes the operating point: from the next GOP on, and where it is lower, from the next frame on.
+    ///
+    /// Raises:
+    ///     ValueError: The stream has fewer layers or refinements; says the highest point. Nothing has changed. Before it is
+    ///         known what the stream has, the next frame raises it.
     fn set_operating_point(&self, py: Python<'_>, op: Point) -> PyResult<()> {
-        self.state(py)?.decoder.set_operating_point(op.0);
+        let mut state = self.state(py)?;
+        if let Some(refused) =
+            state.decoder.highest_point().and_then(|all| operating_point::refused(op.0, all))
+        {
+            return Err(refused);
+        }
+        state.unchecked = Some(op.0);
+        state.decoder.set_operating_point(op.0);
         Ok(())
     }
 
     /// Whether no more frames will come, whatever is pushed.
     #[getter]
     fn is_finished(&self, py: Python<'_>) -> PyResult<bool> {
-        Ok(self.state(py)?.decoder.is_finished())
+        let state = self.state(py)?;
+        Ok(state.held.is_none() && state.decoder.is_finished())
     }
 
     /// Frames in the stream; None before that has come, and where the stream does not say it.

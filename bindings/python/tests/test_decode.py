@@ -143,6 +143,43 @@ def test_the_point_changes_while_decoding(talk: Path) -> None:
     assert first is not None and later and all(len(frame) < len(first) for frame in later)
 
 
+def test_a_point_that_the_stream_does_not_have_is_refused(talk: Path) -> None:
+    for point in ("s3,t0,r9", "s1,t0,r0", (0, 2, 0), (0, 0, 3)):
+        with pytest.raises(ValueError, match="there is no operating point .* go from s0,t0,r0 to s0,t1,r2"):
+            digests(talk, op=point)
+    with talk.open("rb", buffering=0) as file:
+        file.seekable = lambda: False  # type: ignore[method-assign]
+        with pytest.raises(ValueError, match="to s0,t1,r2"):
+            digests(file, op="s3,t0,r9")
+    # The highest number that can be written is all that there is.
+    assert digests(talk, op=(255, 255, 255)) == digests(talk) == digests(talk, op="s0,t1,r2")
+    assert digests(talk, op=(255, 0, 0)) == digests(talk, op=(0, 0, 0))
+
+
+def test_a_point_that_is_refused_costs_no_frame(talk: Path) -> None:
+    expected = digests(talk)
+    decoder = gss.Decoder(op="s0,t1,r3")
+    assert decoder.next_frame() is None
+    decoder.push(talk.read_bytes())
+    decoder.end()
+    for _ in range(2):
+        with pytest.raises(ValueError, match="to s0,t1,r2"):
+            decoder.next_frame()
+    assert decoder.highest_point == (0, 1, 2) and not decoder.is_finished
+    decoder.set_operating_point("s0,t1,r2")
+    assert [frame.digest for frame in decoder] == expected
+    # Once it is known what the stream has, the call itself refuses, and changes nothing.
+    seeking = gss.Decoder(talk, op="s1,t1,r2")
+    with pytest.raises(ValueError, match="to s0,t1,r2"):
+        next(seeking)
+    seeking.set_operating_point("s0,t1,r2")
+    seeking.seek(3)
+    frame = seeking.next_frame()
+    with pytest.raises(ValueError, match="there is no operating point s0,t9,r0"):
+        seeking.set_operating_point("s0,t9,r0")
+    assert frame is not None and [frame.digest, *(frame.digest for frame in seeking)] == expected[3:]
+
+
 def test_what_is_no_point_and_no_range_is_said(talk: Path) -> None:
     with pytest.raises(ValueError, match=r"is \(256, 0, 0\), and its numbers go from 0 to 255"):
         gss.decode(talk, op=(256, 0, 0))

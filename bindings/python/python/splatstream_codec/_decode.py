@@ -31,13 +31,15 @@ def decode(
     Args:
         source: A path, bytes, or a file object in binary mode; it is read as it is needed. One that cannot seek, as
             standard input or a socket, is decoded as it comes.
-        op: The operating point, as "s0,t1,r2" or (0, 1, 2): layers and refinements up to these; everything by default.
+        op: The operating point, as "s0,t1,r2" or (0, 1, 2): layers and refinements up to these, of which 255 is all that
+            there are; everything by default.
         frames: Which frames by their index: range(10, 20), slice(10, None), range(0, 100, 5). Decoding starts at the GOP of
             the first one if the stream has an index.
         limits: What the stream may take; the default is safe for streams of strangers.
         ahead: Decode two frames at a time where neither needs the other.
 
     Raises:
+        ValueError: With the first frame: the stream has fewer layers or refinements than the operating point; says the highest.
         StreamError: The stream cannot be decoded at all, or not within the limits.
         IncompleteError: After the last frame: something was missing or damaged there. Damage elsewhere costs frames;
             `Frame.warnings` tell.
