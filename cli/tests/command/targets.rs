@@ -22,7 +22,7 @@ fn a_quality_is_a_psnr_that_is_measured() {
         assert_eq!(report["wanted_psnr_db"], wanted);
         // Quantisers of so few Gaussians cannot be set as finely.
         assert!((fitted - wanted).abs() <= 1.0, "{report}");
-        let is_met = (fitted - wanted).abs() <= 0.5 && wanted - psnr <= 3.0;
+        let is_met = (fitted - wanted).abs() <= 0.5 && wanted - psnr <= 1.0;
         assert_eq!(is_met, codes(&report).is_empty(), "{report}");
         let views = ["--cameras", "ring:5", "--height", "540"];
         let compared = json(&[&["compare", text(&still), text(&stream)][..], &views].concat());
@@ -62,7 +62,9 @@ fn a_size_is_reached_or_a_warning() {
     let output =
         run(&["encode", text(&still), "-o", text(&stream), "--preset", "fast", "--target-bpg", "0.5"]);
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.starts_with("warning: the stream has ") && said.contains("--sh-degree 0"), "{said}");
+    assert!(said.starts_with("warning: the stream has "), "{said}");
+    // Of so coarse quantisers nothing is left of spherical harmonics.
+    assert!(said.contains("no coarser quantisers are tried: use fewer layers"), "{said}");
     fail(2, &["encode", text(&still), "-o", text(&stream), "--target-bpg", "8", "--quality", "low"]);
     fail(2, &["encode", text(&still), "-o", text(&stream), "--target-mb", "0"]);
 }
@@ -135,7 +137,11 @@ fn the_small_preset_is_fitted_to_pictures_unless_told_otherwise() {
     );
     let frames = write_frames(directory.path());
     let sequence = json(&["encode", text(&frames), "-o", text(&stream), "--preset", "small", "--psnr", "40"]);
-    assert!(chosen(&sequence, "fitting") == Some("none") && codes(&sequence).is_empty(), "{sequence}");
+    assert_eq!(chosen(&sequence, "fitting"), Some("none"), "{sequence}");
+    // Views of so few Gaussians differ.
+    let is_missed = 40.0 - sequence["psnr_db"].as_f64().unwrap() > 1.0;
+    let expected: &[&str] = if is_missed { &["psnr-missed"] } else { &[] };
+    assert_eq!(codes(&sequence), expected, "{sequence}");
 }
 
 #[test]
