@@ -31,6 +31,7 @@ pub use shaper::Bucket;
 pub use tls::Tls;
 
 use axum::Router;
+use axum::body::Bytes;
 use folder::Folder;
 use hyper::Method;
 use hyper::header::{ACCEPT_RANGES, CONTENT_LENGTH, CONTENT_RANGE, ETAG, HeaderValue, IF_RANGE, RANGE};
@@ -196,7 +197,7 @@ pub struct Server {
 /// What all connections have in common.
 struct Shared {
     folder: Folder,
-    page: Option<String>,
+    page: Option<Bytes>,
     tls: Option<TlsAcceptor>,
     limits: Limits,
     network: Network,
@@ -225,7 +226,7 @@ impl Server {
         }
         let shared = Arc::new(Shared {
             folder,
-            page: settings.page.clone(),
+            page: settings.page.clone().map(Bytes::from),
             tls: settings.tls.as_ref().map(Tls::acceptor).transpose()?,
             limits: settings.limits.clone(),
             network: settings.network.clone(),

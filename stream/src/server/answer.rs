@@ -6,7 +6,7 @@ use super::folder::Found;
 use super::range::{Answer, Version};
 use super::transfer::Transfer;
 use axum::Extension;
-use axum::body::Body;
+use axum::body::{Body, Bytes};
 use axum::extract::{Request, State};
 use axum::response::Response;
 use hyper::header::{
@@ -25,14 +25,7 @@ pub(super) async fn answer(
 ) -> Response {
     let transfer = Transfer::begin(shared, connection, &request);
     if let Some(page) = transfer.shared.page.clone().filter(|_| is_for_page(&request)) {
-        let length = page.len().to_string();
-        let headers = [
-            (CACHE_CONTROL, "no-cache"),
-            (CONTENT_TYPE, "text/html; charset=utf-8"),
-            (CONTENT_LENGTH, length.as_str()),
-        ];
-        let content = if request.method() == Method::HEAD { Content::Empty } else { Content::Text(page) };
-        return respond(transfer, StatusCode::OK, &headers, content);
+        return send_page(transfer, &request, page);
     }
     let network = &transfer.shared.network;
     if !network.latency.is_zero() {
@@ -55,6 +48,22 @@ pub(super) async fn answer(
 /// Whether a request is for the page in place of the folder's own.
 fn is_for_page(request: &Request) -> bool {
     [Method::GET, Method::HEAD].contains(request.method()) && request.uri().path() == "/"
+}
+
+/// Answers with the page, of which all answers have the same bytes. It counts among the requests in flight as files do.
+fn send_page(transfer: Transfer, request: &Request, page: Bytes) -> Response {
+    if !transfer.is_allowed() {
+        return refuse(transfer, StatusCode::SERVICE_UNAVAILABLE, &[(RETRY_AFTER, "1")]);
+    }
+    let length = page.len().to_string();
+    let headers = [
+        (CACHE_CONTROL, "no-cache"),
+        (CONTENT_TYPE, "text/html; charset=utf-8"),
+        (CONTENT_LENGTH, length.as_str()),
+    ];
+    let is_empty = request.method() == Method::HEAD || page.is_empty();
+    let content = if is_empty { Content::Empty } else { Content::Page(page) };
+    respond(transfer, StatusCode::OK, &headers, content)
 }
 
 /// Looks where waiting for a disk holds up nobody.
@@ -114,6 +123,8 @@ enum Content {
     Empty,
     /// From where the file is, so many bytes.
     Part(Found, u64),
+    Page(Bytes),
+    /// A few words.
     Text(String),
 }
 
@@ -136,6 +147,7 @@ fn respond(
     transfer.entry.status = status.as_u16();
     let body = match content {
         Content::Part(found, length) => transfer.send(found.file, length),
+        Content::Page(page) => transfer.send_page(page),
         Content::Empty => {
             transfer.entry.complete = true;
             Body::empty()

@@ -61,6 +61,11 @@ impl Transfer {
         Body::from_stream(futures_util::stream::try_unfold(chunks, Chunks::next))
     }
 
+    /// A body of the page, of which parts are handed to the connection as it takes them. The network holds it up nowhere.
+    pub(super) fn send_page(self, page: Bytes) -> Body {
+        Body::from_stream(futures_util::stream::unfold((page, self), next_of_page))
+    }
+
     /// Waits until the link has carried bytes.
     async fn carried(&self, bytes: u32) {
         let Some(until) = self.shared.link.as_ref().map(|link| link.grant(bytes)) else { return };
@@ -76,6 +81,22 @@ impl Drop for Transfer {
         self.shared.ended(&self.entry);
     }
 }
+
+/// The next bytes of the page, which share its memory.
+async fn next_of_page((mut page, mut transfer): (Bytes, Transfer)) -> Option<(Part, (Bytes, Transfer))> {
+    if page.is_empty() {
+        return None;
+    }
+    let size = u32::try_from(page.len()).unwrap_or(u32::MAX).min(CHUNK);
+    let part = page.split_to(usize::try_from(size).unwrap_or(usize::MAX).min(page.len()));
+    transfer.entry.bytes = transfer.entry.bytes.saturating_add(size.into());
+    transfer.entry.complete = page.is_empty();
+    transfer.connection.is_active_until(Instant::now());
+    Some((Ok(part), (page, transfer)))
+}
+
+/// Some bytes of a body.
+type Part = io::Result<Bytes>;
 
 /// The rest of a body.
 struct Chunks {

@@ -78,6 +78,57 @@ fn http_2_needs_no_upgrade() {
     assert!(entries.iter().all(|entry| entry.protocol == "HTTP/2.0" && entry.target == "/talk/s0.mp4"));
 }
 
+/// Asks for the page so many times over one connection whose client takes no bytes of bodies. Gives the statuses; the connection
+/// ends with the runtime.
+async fn ask_and_take_nothing(address: SocketAddr, times: usize) -> Vec<u16> {
+    let mut client = h2::client::Builder::new();
+    client.initial_window_size(0);
+    let socket = TcpStream::connect(address).await.unwrap();
+    let (mut sender, connection) = client.handshake::<_, hyper::body::Bytes>(socket).await.unwrap();
+    tokio::spawn(connection);
+    let mut bodies = Vec::new();
+    let mut statuses = Vec::new();
+    for _ in 0..times {
+        sender = sender.ready().await.unwrap();
+        let request = hyper::Request::get("http://localhost/").body(()).unwrap();
+        let answer = sender.send_request(request, true).unwrap().0.await.unwrap();
+        statuses.push(answer.status().as_u16());
+        bodies.push(answer);
+    }
+    statuses
+}
+
+#[test]
+fn a_page_that_nobody_takes_is_in_flight() {
+    let folder = folder();
+    let page = "x".repeat(1 << 20);
+    let server = Running::start(folder.path(), |settings| {
+        settings.page = Some(page.clone());
+        settings.limits.requests = 2;
+    });
+    assert_eq!(wait(ask_and_take_nothing(server.address, 4)), [200, 200, 503, 503]);
+    // They end with the connection.
+    let begun = std::time::Instant::now();
+    let mut reply = super::client::get(server.address, "/", &[]);
+    while reply.status == 503 && begun.elapsed().as_secs() < 10 {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        reply = super::client::get(server.address, "/", &[]);
+    }
+    assert!(reply.status == 200 && reply.body == page.as_bytes());
+    assert_eq!(super::client::ask(server.address, "HEAD", "/", &[]).header("content-length"), "1048576");
+    let (statistics, entries) = server.stop();
+    // What was handed to the connection is counted, which is little of what nobody took.
+    let pages: Vec<_> =
+        entries.iter().filter(|entry| entry.status == 200).map(|one| (one.complete, one.bytes)).collect();
+    assert_eq!(pages.iter().filter(|page| **page == (true, 1 << 20)).count(), 1, "{pages:?}");
+    assert_eq!(
+        pages.iter().filter(|(complete, bytes)| !complete && *bytes < 1 << 18).count(),
+        2,
+        "{pages:?}"
+    );
+    assert_eq!(statistics.incomplete, 2);
+}
+
 #[test]
 fn tls_offers_both_versions() {
     let folder = folder();
