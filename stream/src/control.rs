@@ -25,6 +25,7 @@ mod driven;
 mod fetch;
 pub(crate) mod ladder;
 mod layered;
+mod levels;
 mod live;
 pub(crate) mod number;
 mod options;
@@ -38,9 +39,10 @@ mod throughput;
 pub use baselines::{Bola, BufferRule, ThroughputRule};
 pub use fetch::Fetch;
 pub use ladder::{
-    Description, Gop, Ladder, LadderError, Layer, Levels, OperatingPoint, Piece, Point, Representation,
+    Description, Gop, Ladder, LadderError, Layer, OperatingPoint, Piece, Point, Representation,
 };
 pub use layered::{Layered, Weights};
+pub use levels::Levels;
 pub use options::{Choice, Limits, Range, choices, order, whole_ranges};
 pub use rule::{Decision, Rule};
 pub use session::Session;

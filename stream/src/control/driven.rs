@@ -1,6 +1,7 @@
 //! Playback that somebody looks at: GOPs begin when the caller says so, in any order, and stand still as long as it wants.
 
-use super::ladder::{Levels, OperatingPoint};
+use super::ladder::OperatingPoint;
+use super::levels::Levels;
 use super::rule::Rule;
 use super::session::Session;
 

@@ -1,7 +1,9 @@
 //! What a player knows of a presentation: per GOP the pieces it can fetch, and what they are worth together.
 
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 
+use super::levels::Levels;
 use super::number::{real, size};
 
 /// What a Representation carries.
@@ -53,61 +55,6 @@ impl fmt::Display for OperatingPoint {
     }
 }
 
-/// How many refinements of each Representation are meant: a set of pieces, of which each Representation has a prefix.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Levels(Vec<u8>);
-
-impl Levels {
-    /// A set without pieces, of so many Representations.
-    pub fn none(representations: usize) -> Self {
-        Self(vec![0; representations])
-    }
-
-    /// A set of all pieces that there can be.
-    pub fn all(representations: usize) -> Self {
-        Self(vec![u8::MAX; representations])
-    }
-
-    /// How many refinements of a Representation are in the set.
-    pub fn of(&self, representation: usize) -> u8 {
-        self.0.get(representation).copied().unwrap_or(0)
-    }
-
-    /// Whether all pieces of another set are in this one.
-    pub fn contains(&self, other: &Self) -> bool {
-        other.0.iter().enumerate().all(|(index, &count)| count <= self.of(index))
-    }
-
-    /// Whether there are no pieces in the set.
-    pub fn is_empty(&self) -> bool {
-        self.0.iter().all(|&count| count == 0)
-    }
-
-    /// Adds refinements of a Representation, up to a count.
-    pub fn raise(&mut self, representation: usize, count: u8) {
-        if let Some(own) = self.0.get_mut(representation) {
-            *own = (*own).max(count);
-        }
-    }
-
-    /// Removes the refinements of a Representation from a count on.
-    pub fn lower(&mut self, representation: usize, count: u8) {
-        if let Some(own) = self.0.get_mut(representation) {
-            *own = (*own).min(count);
-        }
-    }
-
-    /// The pieces that are in both sets.
-    pub fn intersection(&self, other: &Self) -> Self {
-        Self(self.0.iter().enumerate().map(|(index, &count)| count.min(other.of(index))).collect())
-    }
-
-    /// The pieces of both sets.
-    pub fn union(&self, other: &Self) -> Self {
-        Self(self.0.iter().enumerate().map(|(index, &count)| count.max(other.of(index))).collect())
-    }
-}
-
 /// What can be played of a GOP if certain pieces are there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
@@ -132,7 +79,7 @@ pub struct Description {
     pub duration_us: u64,
     /// Per Representation the number of frames it adds; the first of an I frame has 1, what adds to it 0.
     pub frames: Vec<u32>,
-    /// Per Representation its refinements, from 1 to 16.
+    /// Per Representation its refinements, from 1 to 16; none where the GOP has nothing for one that is not the base.
     pub pieces: Vec<Vec<Piece>>,
     /// Quality in dB of operating points, as displayed over the whole GOP: frames that are not there count as the one
     /// before, standing still. If a point is missing, all get estimates, which are only good for comparing points of one GOP.
@@ -196,7 +143,7 @@ pub enum LadderError {
     /// The first Representation is not spatial layer 0 without dependencies, or another one needs none, itself, or one
     /// that comes after it.
     Dependencies,
-    /// A GOP lists fewer or more Representations than there are, or one without refinements or with over 16.
+    /// A GOP lists fewer or more Representations than there are, a base without refinements, or one with over 16.
     Pieces,
     /// A GOP has no duration, or a quality is not a number.
     Values,
@@ -208,7 +155,7 @@ impl fmt::Display for LadderError {
             Self::Dependencies => {
                 "a Representation other than the base must need earlier ones, and the base none"
             }
-            Self::Pieces => "a GOP must list from 1 to 16 refinements of each Representation",
+            Self::Pieces => "a GOP must list all Representations, with 1 to 16 refinements of the base and up to 16 of the others",
             Self::Values => "a GOP must have a duration, and its qualities must be numbers",
         })
     }
@@ -272,7 +219,8 @@ impl Ladder {
     pub fn push(&mut self, description: Description) -> Result<(), LadderError> {
         let count = self.representations.len();
         let counted = description.pieces.len() == count && description.frames.len() == count;
-        if !counted || description.pieces.iter().any(|pieces| !(1..=16).contains(&pieces.len())) {
+        let has_base = description.pieces.first().is_some_and(|base| !base.is_empty());
+        if !counted || !has_base || description.pieces.iter().any(|pieces| pieces.len() > 16) {
             return Err(LadderError::Pieces);
         }
         if description.duration_us == 0 || description.quality.iter().any(|(_, quality)| !quality.is_finite())
@@ -299,25 +247,29 @@ impl Ladder {
         self.gops.iter().map(Gop::duration_us).fold(0, u64::saturating_add)
     }
 
-    /// All operating points of a GOP whose pieces differ, each under its lowest name.
+    /// All operating points of a GOP whose pieces differ, each under its lowest name. They are as many as what the GOP has can
+    /// make, and the same pieces are found by their hash: a list of many GOPs costs no more than it says of them.
     fn points(&self, gop: &Description) -> Vec<Point> {
         let mut points: Vec<Point> = Vec::new();
+        let mut known: HashSet<Levels> = HashSet::new();
         for name in self.names(gop) {
             let Some(levels) = self.levels(name, gop) else { continue };
-            if !points.iter().any(|point| point.levels == levels) {
+            if known.insert(levels.clone()) {
                 points.push(point(name, levels, gop));
             }
         }
+        points.shrink_to_fit();
         estimate(&mut points, &gop.quality);
         points.sort_by(|a, b| a.bytes.cmp(&b.bytes).then(a.name.cmp(&b.name)));
         points
     }
 
-    /// Names of all combinations of layers and refinements.
+    /// Names of all combinations of refinements and of layers of which the GOP has something.
     fn names(&self, gop: &Description) -> Vec<OperatingPoint> {
         let mut spatial = Vec::new();
         let mut temporal = vec![None];
-        for representation in &self.representations {
+        let there = self.representations.iter().zip(&gop.pieces).filter(|(_, pieces)| !pieces.is_empty());
+        for (representation, _) in there {
             match representation.layer {
                 Layer::Spatial(layer) => spatial.push(layer),
                 Layer::Temporal(layer) => temporal.push(Some(layer)),
@@ -338,15 +290,18 @@ impl Ladder {
         names
     }
 
-    /// The pieces of an operating point; none if it lacks what one of its temporal layers needs.
+    /// The pieces of an operating point; none if it lacks what one of its temporal layers needs. Of what a GOP has nothing of,
+    /// nothing is lacking.
     fn levels(&self, name: OperatingPoint, gop: &Description) -> Option<Levels> {
         let mut levels = Levels::none(self.representations.len());
+        let has = |need: usize| gop.pieces.get(need).is_some_and(|pieces| !pieces.is_empty());
         for (index, (representation, pieces)) in self.representations.iter().zip(&gop.pieces).enumerate() {
             let wanted = match representation.layer {
                 Layer::Spatial(layer) => layer <= name.spatial,
                 Layer::Temporal(layer) => Some(layer) <= name.temporal,
             };
-            if wanted && representation.needs.iter().any(|&need| levels.of(need) == 0) {
+            let wanted = wanted && !pieces.is_empty();
+            if wanted && representation.needs.iter().any(|&need| has(need) && levels.of(need) == 0) {
                 return None;
             }
             if wanted {
@@ -379,8 +334,11 @@ fn point(name: OperatingPoint, levels: Levels, gop: &Description) -> Point {
 /// Gives points their quality: from the table or, if that lacks one of them, 6 dB per factor of ten in bytes below 36 dB, less
 /// up to 6 dB for frames that stand still.
 fn estimate(points: &mut [Point], table: &[(OperatingPoint, f64)]) {
-    let known =
-        |point: &Point| table.iter().find(|(name, _)| *name == point.name).map(|&(_, quality)| quality);
+    let mut by_name: HashMap<OperatingPoint, f64> = HashMap::new();
+    for &(name, quality) in table {
+        by_name.entry(name).or_insert(quality);
+    }
+    let known = |point: &Point| by_name.get(&point.name).copied();
     let complete = points.iter().all(|point| known(point).is_some());
     let most = real(points.iter().map(|point| point.bytes).max().unwrap_or(1).max(1));
     let all = f64::from(points.iter().map(|point| point.frames).max().unwrap_or(1).max(1));
@@ -444,6 +402,33 @@ mod tests {
             assert_eq!(ladder.push(description), Err(error));
         }
         assert_eq!((ladder.push(good), ladder.gops().len()), (Ok(()), 1));
+    }
+
+    #[test]
+    fn a_gop_has_no_points_for_layers_that_it_has_nothing_of() {
+        let representations = vec![
+            representation(Layer::Spatial(0), &[]),
+            representation(Layer::Spatial(1), &[0]),
+            representation(Layer::Temporal(0), &[0, 1]),
+            representation(Layer::Temporal(1), &[0, 1, 2]),
+        ];
+        let mut ladder = Ladder::new(representations).expect("they are in order");
+        let piece = |bytes| Piece { bytes, gaussians: bytes };
+        let both = vec![piece(1), piece(2)];
+        let gops = [
+            (vec![vec![piece(0)], vec![], vec![], vec![]], vec!["s0,i,r0"]),
+            // The enhancement plays without the frames below it, which are not there.
+            (vec![both.clone(), vec![], vec![], both], vec!["s0,i,r0", "s0,t1,r0", "s0,i,r1", "s0,t1,r1"]),
+        ];
+        for (pieces, expected) in gops {
+            let description =
+                Description { duration_us: 1, frames: vec![1, 0, 0, 3], pieces, quality: vec![] };
+            ladder.push(description).expect("the base is there");
+            let gop = ladder.gops().last().expect("it was appended");
+            let names: Vec<String> = gop.points().iter().map(|point| point.name.to_string()).collect();
+            assert_eq!(names, expected);
+            assert_eq!(gop.points[0].levels.of(1), 0);
+        }
     }
 
     #[test]

@@ -4,7 +4,8 @@ mod idle;
 mod start;
 
 use super::fetch::Fetch;
-use super::ladder::{Gop, Levels};
+use super::ladder::Gop;
+use super::levels::Levels;
 use super::number::{count, real, seconds};
 use super::options::{Choice, choices, gain};
 use super::plan::{Outlook, Stage, best};

@@ -1,6 +1,7 @@
 //! What can be done with one GOP: the operating points that are worth their bytes, and the order of their pieces.
 
-use super::ladder::{Gop, Levels, Point};
+use super::ladder::{Gop, Point};
+use super::levels::Levels;
 use super::number::{real, seconds};
 
 /// What a device can take, besides what the network can carry. The base of a GOP is played whatever it needs.

@@ -1,7 +1,7 @@
 //! What a rule sees and answers.
 
 use super::fetch::Fetch;
-use super::ladder::Levels;
+use super::levels::Levels;
 use super::options::{order, whole_ranges};
 use super::state::State;
 

@@ -1,7 +1,8 @@
 //! The state machine of playback: events in, decisions out.
 
 use super::fetch::Fetch;
-use super::ladder::{Description, Gop, Ladder, LadderError, Levels};
+use super::ladder::{Description, Gop, Ladder, LadderError};
+use super::levels::Levels;
 use super::rule::{Decision, Rule};
 use super::state::{Playback, Request, Settings, Shown, State};
 use super::throughput::Transfer;

@@ -1,7 +1,8 @@
 //! What a session knows at one time: what has arrived, what is playing, what is being fetched.
 
 use super::fetch::Fetch;
-use super::ladder::{Gop, Ladder, Levels, OperatingPoint, Point};
+use super::ladder::{Gop, Ladder, OperatingPoint, Point};
+use super::levels::Levels;
 use super::options::{Choice, Limits, available_choices};
 use super::throughput::{Network, Transfer};
 

@@ -5,6 +5,7 @@ use crate::control::number::{real, size};
 use crate::control::{Description, Ladder, LadderError, Layer, OperatingPoint, Piece, Representation};
 use crate::representation::Representation as Kind;
 use core::ops::Range;
+use std::collections::{HashMap, HashSet};
 
 /// What a frame that stands still costs in dB, where no picture of it was measured.
 const STILL: f64 = 6.0;
@@ -47,9 +48,7 @@ impl Manifest {
                 .collect(),
         };
         let mut ladder = Ladder::new(layers.iter().enumerate().map(needs).collect())?;
-        for gop in 0..self.complete_gops() {
-            ladder.push(self.description(gop).ok_or(LadderError::Pieces)?)?;
-        }
+        self.descriptions(0).try_for_each(|description| ladder.push(description))?;
         Ok(ladder)
     }
 
@@ -60,6 +59,16 @@ impl Manifest {
 
     /// A GOP of [`Manifest::ladder`]; none if there are not so many.
     pub fn description(&self, gop: usize) -> Option<Description> {
+        self.describe(gop, &Qualities::of(self))
+    }
+
+    /// All GOPs of [`Manifest::ladder`] from one on.
+    pub(crate) fn descriptions(&self, from: usize) -> impl Iterator<Item = Description> {
+        let qualities = Qualities::of(self);
+        (from..self.complete_gops()).map_while(move |gop| self.describe(gop, &qualities))
+    }
+
+    fn describe(&self, gop: usize, qualities: &Qualities) -> Option<Description> {
         let info = self.gops.get(gop).filter(|gop| !gop.growing)?;
         let mut description = Description {
             duration_us: self.duration_us(gop),
@@ -73,10 +82,12 @@ impl Manifest {
             // Layers of I frames add to the frame of the base.
             let is_layer = matches!(layer(&one.id), Some(Layer::Spatial(_))) && index > 0;
             description.frames.push(if is_layer { 0 } else { u32::try_from(frames).unwrap_or(u32::MAX) });
-            let pieces = (0..self.pieces_of(index)).filter_map(|piece| self.levels_of_piece(index, piece));
+            // Where a GOP lists nothing, nothing is kept: many GOPs are listed in few bytes. The base has a piece always.
+            let listed = own().next().map_or(u8::from(index == 0), |_| self.pieces_of(index));
+            let pieces = (0..listed).filter_map(|piece| self.levels_of_piece(index, piece));
             description.pieces.push(pieces.map(|levels| piece(own(), &levels, size(frames))).collect());
         }
-        description.quality = self.qualities(gop, info);
+        description.quality = qualities.of_gop(gop, info);
         Some(description)
     }
 
@@ -117,20 +128,36 @@ impl Manifest {
         let us = ticks.saturating_mul(1_000_000).checked_div(self.stream.ticks_per_second.into());
         us.and_then(|us| u64::try_from(us).ok()).unwrap_or(u64::MAX).max(1)
     }
+}
+
+/// The rows of the table of qualities, each point once: those of all GOPs under none. It is sorted once, as there may be
+/// many GOPs and many rows.
+struct Qualities(HashMap<Option<u32>, Vec<(OperatingPoint, f64)>>);
+
+impl Qualities {
+    fn of(manifest: &Manifest) -> Self {
+        let mut known = HashSet::new();
+        let mut rows: HashMap<_, Vec<_>> = HashMap::new();
+        for one in manifest.quality.iter().flatten() {
+            let Some(name) = named(&one.point) else { continue };
+            let Some(quality) = one.psnr_db.map(|psnr| psnr.min(EXACT)) else { continue };
+            if known.insert((one.gop, name)) {
+                rows.entry(one.gop).or_default().push((name, quality));
+            }
+        }
+        Self(rows)
+    }
+
+    fn rows(&self, gop: Option<u32>) -> &[(OperatingPoint, f64)] {
+        self.0.get(&gop).map_or(&[], Vec::as_slice)
+    }
 
     /// What the table says of a GOP or, where it has nothing, of all of them. Of points at which only I frames are played
     /// it has nothing: these are estimated from those with the frames of the lowest temporal layer.
-    fn qualities(&self, gop: usize, info: &GopInfo) -> Vec<(OperatingPoint, f64)> {
-        let number = u32::try_from(gop).ok();
-        let table = || self.quality.iter().flatten();
-        let mut found: Vec<(OperatingPoint, f64)> = Vec::new();
-        for one in table().filter(|one| one.gop == number).chain(table().filter(|one| one.gop.is_none())) {
-            let Some(name) = named(&one.point) else { continue };
-            let Some(quality) = one.psnr_db.map(|psnr| psnr.min(EXACT)) else { continue };
-            if !found.iter().any(|(known, _)| *known == name) {
-                found.push((name, quality));
-            }
-        }
+    fn of_gop(&self, gop: usize, info: &GopInfo) -> Vec<(OperatingPoint, f64)> {
+        let mut found = u32::try_from(gop).map_or(&[][..], |gop| self.rows(Some(gop))).to_vec();
+        let own: HashSet<OperatingPoint> = found.iter().map(|(name, _)| *name).collect();
+        found.extend(self.rows(None).iter().filter(|(name, _)| !own.contains(name)));
         let still = STILL * (1.0 - 1.0 / real(info.frame_count.max(1).into()));
         let intra: Vec<(OperatingPoint, f64)> = found
             .iter()
@@ -267,6 +294,23 @@ mod tests {
         // One point less, and all are estimates.
         manifest.quality.iter_mut().for_each(|table| table.truncate(5));
         assert_eq!(quality(&manifest, "s1,t1,r1"), Some(36.0));
+    }
+
+    #[test]
+    fn gops_without_subsegments_cost_little() {
+        let mut manifest = manifest();
+        manifest.gops[0].subsegments.clear();
+        manifest.gops = vec![manifest.gops[0].clone(); 20_000];
+        let row = |gop| QualityInfo { point: "s0,t0,r0".into(), gop, psnr_db: Some(30.0), ssim: None };
+        manifest.quality = Some((0..20_000).map(|gop| row(Some(gop))).collect());
+        let begun = std::time::Instant::now();
+        let ladder = manifest.ladder().expect("each has a base");
+        // For each GOP all rows would take minutes.
+        assert!(begun.elapsed().as_secs() < 10, "{:?}", begun.elapsed());
+        let points: usize = ladder.gops().iter().map(|gop| gop.points().len()).sum();
+        let pieces: usize =
+            ladder.gops().iter().flat_map(|gop| (0..4).map(|one| gop.pieces(one).len())).sum();
+        assert_eq!((points, pieces), (20_000, 20_000));
     }
 
     #[test]

@@ -273,11 +273,9 @@ impl<R: Rule> Player<R> {
     fn append(&mut self, now_us: u64, manifest: Manifest, from: usize) -> Result<(), PlaybackError> {
         let first = first_gop(&manifest);
         let mut gops = std::mem::take(&mut self.manifest.gops);
-        for index in from.saturating_sub(first)..manifest.complete_gops() {
-            let number = first.saturating_add(index);
-            let Some((info, description)) = manifest.gops.get(index).zip(manifest.description(index)) else {
-                break;
-            };
+        let skipped = from.saturating_sub(first);
+        let described = manifest.gops.iter().skip(skipped).zip(manifest.descriptions(skipped));
+        for (number, (info, description)) in (first.saturating_add(skipped)..).zip(described) {
             let pushed = self.session.push(now_us, description);
             pushed.map_err(|_| PlaybackError::Changed(Some(number)))?;
             self.logs.push(log(number, info));
