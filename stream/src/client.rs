@@ -58,8 +58,8 @@ pub struct Options {
     pub attempts: u32,
     /// Requests for the base of a GOP before the GOP is left out.
     pub base_attempts: u32,
-    /// Bytes of the package that are held at the same time; as many again of whole files, where a server does not answer
-    /// with ranges of bytes.
+    /// Bytes of the package that are held at the same time; as many again of whole files, kept and on their way together,
+    /// where a server does not answer with ranges of bytes.
     pub memory: u64,
 }
 
@@ -175,7 +175,11 @@ fn read_manifest(source: &Source, options: &Options) -> Result<(Manifest, Option
     let mut attempt = 1;
     loop {
         match source.whole(Package::MANIFEST, Manifest::MAX_BYTES, None) {
-            Ok(Some((bytes, tag))) => return Ok((Manifest::parse(&bytes)?.up_to(options.layers), tag)),
+            Ok(Some((bytes, tag))) => {
+                let manifest = Manifest::parse(&bytes)?;
+                source.expect(&manifest);
+                return Ok((manifest.up_to(options.layers), tag));
+            }
             Ok(None) => return Err(unasked(source)),
             Err(fault) if attempt >= options.base_attempts || fault.is_final() => {
                 return Err(ClientError::Unreachable(source.place(Package::MANIFEST), fault.to_string()));

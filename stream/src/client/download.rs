@@ -3,6 +3,7 @@
 use super::source::Source;
 use crate::playback::{ByteRequest, Fault};
 use std::io::{ErrorKind, Read};
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::Duration;
 
@@ -25,10 +26,13 @@ const CHUNK: usize = 1 << 16;
 /// Chunks that wait for the player: so the memory is bounded.
 const WAITING: usize = 16;
 
-/// Requests that run. To drop it is to give them up: the connection is closed when its next bytes come, or its time is over.
+/// Requests that run. To drop it is to give them up: the connection is closed when its next bytes come, or its time
+/// is over.
 #[derive(Debug)]
 pub(super) struct Download {
     events: Receiver<Event>,
+    /// Those who fetch see when it is gone.
+    _waiting: Arc<()>,
 }
 
 impl Download {
@@ -36,9 +40,11 @@ impl Download {
     pub(super) fn start(source: Source, requests: Vec<ByteRequest>) -> Self {
         let (sender, events) = sync_channel(WAITING);
         let failed = sender.clone();
+        let waiting = Arc::new(());
+        let seen = Arc::downgrade(&waiting);
         let work = move || {
             for request in &requests {
-                match fetch(&source, request, &sender) {
+                match fetch(&source, request, &sender, &|| seen.strong_count() > 0) {
                     Ok(true) => {}
                     Ok(false) => return,
                     Err(fault) => {
@@ -51,7 +57,7 @@ impl Download {
         if let Err(error) = std::thread::Builder::new().name("download".into()).spawn(work) {
             let _nobody_listens = failed.try_send(Event::Failed(error.into()));
         }
-        Self { events }
+        Self { events, _waiting: waiting }
     }
 
     /// What happens next, within a time.
@@ -66,11 +72,16 @@ impl Download {
 }
 
 /// One request. Gives false if nobody wants it any more.
-fn fetch(source: &Source, request: &ByteRequest, sender: &SyncSender<Event>) -> Result<bool, Fault> {
+fn fetch(
+    source: &Source,
+    request: &ByteRequest,
+    sender: &SyncSender<Event>,
+    is_wanted: &dyn Fn() -> bool,
+) -> Result<bool, Fault> {
     if sender.send(Event::Sent).is_err() {
         return Ok(false);
     }
-    let mut reader = source.range(&request.file, request.offset, request.size)?;
+    let mut reader = source.range(request, is_wanted)?;
     if sender.send(Event::Begun).is_err() {
         return Ok(false);
     }

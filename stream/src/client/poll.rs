@@ -45,5 +45,6 @@ fn poll(source: &Source, layers: (u8, u8), known: Option<&str>) -> Polled {
     };
     // It may be whole the next time.
     let manifest = Manifest::parse(&bytes).map_err(|error| Fault::Failed(error.to_string()))?;
+    source.expect(&manifest);
     Ok(Some((manifest.up_to(layers), tag)))
 }

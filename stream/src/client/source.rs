@@ -1,10 +1,10 @@
 //! Where a package is: ranges of bytes of its files, from an HTTP server or a directory.
 
 use super::Options;
-use super::whole::{WholeFiles, kept_range};
-use crate::manifest::digest_of;
+use super::whole::{Wanted, WholeFiles, kept_range};
+use crate::manifest::{Manifest, digest_of};
 use crate::package::Package;
-use crate::playback::Fault;
+use crate::playback::{ByteRequest, Fault};
 use std::collections::HashMap;
 use std::ffi::OsStr;
 use std::fs::File;
@@ -87,15 +87,29 @@ impl Source {
         Ok((!is_known).then_some((bytes, tag)))
     }
 
-    /// A range of a file, which has one byte or more. The reader may have fewer bytes, and more.
-    pub(super) fn range(&self, file: &str, offset: u64, size: u64) -> Result<Box<dyn Read + Send>, Fault> {
+    /// A range of a file, which has one byte or more. The reader may have fewer bytes, and more. Where much has to be read for
+    /// it, that ends when the range is not wanted any more.
+    pub(super) fn range(
+        &self,
+        request: &ByteRequest,
+        is_wanted: &dyn Fn() -> bool,
+    ) -> Result<Box<dyn Read + Send>, Fault> {
+        let ByteRequest { file, offset, size } = request;
+        let (offset, size) = (*offset, *size);
         match self {
-            Self::Server(server) => server.range(file, offset, size),
+            Self::Server(server) => server.range(file, (offset, size), is_wanted),
             Self::Directory(path) => {
                 let mut file = File::open(path.join(file))?;
                 file.seek(SeekFrom::Start(offset))?;
                 Ok(Box::new(file.take(size)))
             }
+        }
+    }
+
+    /// Takes from a manifest how large files can be.
+    pub(super) fn expect(&self, manifest: &Manifest) {
+        if let Self::Server(server) = self {
+            server.files.expect(manifest);
         }
     }
 
@@ -174,23 +188,33 @@ impl Server {
     }
 
     /// A range of a file. A server that has sent a whole file in place of a range is taken to do so with every file.
-    fn range(&self, file: &str, offset: u64, size: u64) -> Result<Box<dyn Read + Send>, Fault> {
+    fn range(
+        &self,
+        file: &str,
+        range: (u64, u64),
+        is_wanted: &dyn Fn() -> bool,
+    ) -> Result<Box<dyn Read + Send>, Fault> {
+        let (offset, size) = range;
+        let mut wanted = Wanted { file, length: None, range, is_wanted };
         let slot = self.files.is_needed().then(|| self.files.slot(file));
         let mut held = slot.as_ref().map(|slot| slot.lock().unwrap_or_else(PoisonError::into_inner));
         if let Some(range) = held.as_ref().and_then(|kept| kept_range(kept, offset, size)) {
             return Ok(range);
         }
+        if let Some(came) = held.as_mut().and_then(|kept| self.files.go_on(kept, &wanted)) {
+            return came;
+        }
         let response = self.answer(file, offset, size)?;
-        let length = response.body().content_length();
+        wanted.length = response.body().content_length();
         let is_range = response.status() == StatusCode::PARTIAL_CONTENT;
         let body = response.into_body().into_reader();
         match &mut held {
             _ if is_range => Ok(Box::new(body)),
-            Some(kept) => self.files.keep(kept, body, length, (offset, size)),
+            Some(kept) => self.files.keep(kept, body, &wanted),
             None => {
                 let slot = self.files.slot(file);
                 let mut kept = slot.lock().unwrap_or_else(PoisonError::into_inner);
-                self.files.keep(&mut kept, body, length, (offset, size))
+                self.files.keep(&mut kept, body, &wanted)
             }
         }
     }

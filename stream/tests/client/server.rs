@@ -40,6 +40,10 @@ pub(crate) enum Answer {
     Whole,
     /// Another range, of the same length.
     Other,
+    /// A head, and the same text after it until the client leaves.
+    Endless(&'static str, &'static str),
+    /// To another address.
+    Elsewhere(&'static str),
 }
 
 type Behaviour = dyn Fn(&Request) -> Answer + Send + Sync;
@@ -125,6 +129,18 @@ fn read(reader: &mut impl BufRead) -> Option<Request> {
 }
 
 fn answer(mut stream: &TcpStream, request: &Request, answer: Answer, content: &Mutex<Content>) -> Option<()> {
+    match answer {
+        Answer::Endless(head, rest) => {
+            stream.write_all(head.as_bytes()).ok()?;
+            let rest = rest.repeat(1 << 12);
+            while stream.write_all(rest.as_bytes()).is_ok() {}
+            return None;
+        }
+        Answer::Elsewhere(to) => {
+            return write!(stream, "HTTP/1.1 302 Found\r\nLocation: {to}\r\nContent-Length: 0\r\n\r\n").ok();
+        }
+        _ => {}
+    }
     let (file, tag) = {
         let content = content.lock().unwrap();
         let file = content.files.get(&request.file).cloned();
