@@ -21,6 +21,7 @@ mod player;
 mod poll;
 mod report;
 mod source;
+mod transport;
 mod whole;
 
 use crate::control::Settings;

@@ -1,6 +1,7 @@
 //! Where a package is: ranges of bytes of its files, from an HTTP server or a directory.
 
 use super::Options;
+use super::transport::{self, Counting};
 use super::whole::{Wanted, WholeFiles, kept_range};
 use crate::manifest::{Manifest, digest_of};
 use crate::package::Package;
@@ -12,7 +13,10 @@ use std::io::{self, Read, Seek, SeekFrom};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use ureq::http::{HeaderMap, Response, StatusCode, header};
-use ureq::{Agent, Body};
+use ureq::typestate::WithoutBody;
+use ureq::unversioned::resolver::DefaultResolver;
+use ureq::unversioned::transport::{Connector, DefaultConnector};
+use ureq::{Agent, Body, RequestBuilder};
 
 impl From<io::Error> for Fault {
     fn from(error: io::Error) -> Self {
@@ -155,7 +159,11 @@ impl Server {
             .user_agent(concat!("splatstream/", env!("CARGO_PKG_VERSION")))
             .accept_encoding("identity");
         Self {
-            agent: config.build().new_agent(),
+            agent: Agent::with_parts(
+                config.build(),
+                DefaultConnector::new().chain(Counting),
+                DefaultResolver::default(),
+            ),
             base: format!("{base}/"),
             query: query.to_owned(),
             tags: Arc::default(),
@@ -176,11 +184,11 @@ impl Server {
         if let Some(tag) = known {
             request = request.header(header::IF_NONE_MATCH, tag);
         }
-        let response = request.call()?;
+        let response = call(request)?;
         match response.status() {
             StatusCode::OK => {
                 let tag = text(response.headers(), header::ETAG.as_str()).map(str::to_owned);
-                Ok(Some((response.into_body().into_reader(), tag)))
+                Ok(Some((transport::Body(response.into_body().into_reader()), tag)))
             }
             StatusCode::NOT_MODIFIED if known.is_some() => Ok(None),
             status => Err(Fault::Status(status.as_u16())),
@@ -207,7 +215,7 @@ impl Server {
         let response = self.answer(file, offset, size)?;
         wanted.length = response.body().content_length();
         let is_range = response.status() == StatusCode::PARTIAL_CONTENT;
-        let body = response.into_body().into_reader();
+        let body = transport::Body(response.into_body().into_reader());
         match &mut held {
             _ if is_range => Ok(Box::new(body)),
             Some(kept) => self.files.keep(kept, body, &wanted),
@@ -229,7 +237,7 @@ impl Server {
         if let Some(tag) = known.as_deref().filter(|tag| !tag.starts_with("W/")) {
             request = request.header(header::IF_RANGE, tag);
         }
-        let response = request.call()?;
+        let response = call(request)?;
         self.check(file, &response, known.as_deref(), offset, last)?;
         Ok(response)
     }
@@ -278,6 +286,12 @@ impl Server {
             tags.insert(file.to_owned(), tag.to_owned());
         }
     }
+}
+
+/// The response to a request, after redirects.
+fn call(request: RequestBuilder<WithoutBody>) -> Result<Response<Body>, Fault> {
+    transport::progress();
+    Ok(request.call()?)
 }
 
 fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {

@@ -1,8 +1,31 @@
-//! Servers whose answers never end.
+//! Servers whose answers never end, and that send clients elsewhere.
 
-use super::server::Answer;
-use super::{is_range, mixed, named, play_from};
+use super::server::{Answer, Server};
+use super::{is_range, mixed, named, options, play_from, served};
+use splatstream_stream::client::{Client, Options};
+use splatstream_stream::package::Layout;
 use std::time::{Duration, Instant};
+
+/// Why a manifest cannot be had that is answered so, after one attempt.
+fn refusal(answer: Answer) -> String {
+    let server = Server::start(served(&mixed(), Layout::Gop), move |_| answer.clone());
+    let begun = Instant::now();
+    let options = Options { base_attempts: 1, read_timeout: Duration::from_secs(10), ..options() };
+    let refused = Client::open(&server.url, options).unwrap_err().to_string();
+    assert!(begun.elapsed() < Duration::from_secs(5), "{:?}: {refused}", begun.elapsed());
+    refused
+}
+
+#[test]
+fn what_is_no_body_comes_to_an_end() {
+    let chunked = "HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\n";
+    let trailers: &str = Box::leak(format!("{chunked}0\r\n").into_boxed_str());
+    let redirect = "HTTP/1.1 302 Found\r\nLocation: /a\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n";
+    for head in [trailers, redirect] {
+        let refused = refusal(Answer::Endless(head, "A: b\r\n"));
+        assert!(refused.contains("without a byte of a body"), "{refused}");
+    }
+}
 
 #[test]
 fn bodies_end_with_what_the_manifest_says() {
