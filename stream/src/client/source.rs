@@ -150,7 +150,7 @@ impl Server {
         let config = Agent::config_builder()
             .http_status_as_error(false)
             .max_redirects(options.redirects)
-            .max_redirects_will_error(true)
+            .max_redirects_will_error(false)
             .timeout_connect(Some(options.connect_timeout))
             .timeout_recv_response(Some(options.read_timeout))
             .timeout_per_read(Some(options.read_timeout))
@@ -291,7 +291,30 @@ impl Server {
 /// The response to a request, after redirects.
 fn call(request: RequestBuilder<WithoutBody>) -> Result<Response<Body>, Fault> {
     transport::progress();
-    Ok(request.call()?)
+    let response = request.call().map_err(|error| match error {
+        ureq::Error::BadUri(why) if why.starts_with("unknown scheme") => ELSEWHERE,
+        error => error.into(),
+    })?;
+    let location = text(response.headers(), header::LOCATION.as_str());
+    match location.filter(|_| REDIRECTS.contains(&response.status().as_u16())) {
+        Some(location) if is_elsewhere(location) => Err(ELSEWHERE),
+        Some(_) => Err(Fault::Wrong("too many redirects")),
+        None => Ok(response),
+    }
+}
+
+/// Why a redirect is not followed.
+const ELSEWHERE: Fault = Fault::Wrong("the server redirects to an address that is neither http nor https");
+
+/// Statuses of redirects that are followed.
+const REDIRECTS: [u16; 5] = [301, 302, 303, 307, 308];
+
+/// Whether a location has a scheme that is not one of the web. The library takes some of these for names of files.
+fn is_elsewhere(location: &str) -> bool {
+    let Some((scheme, _)) = location.split_once(':') else { return false };
+    let is_scheme = scheme.starts_with(|first: char| first.is_ascii_alphabetic())
+        && scheme.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"+-.".contains(&byte));
+    is_scheme && !["http", "https"].iter().any(|known| known.eq_ignore_ascii_case(scheme))
 }
 
 fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
@@ -301,6 +324,16 @@ fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn schemes_are_not_names_of_files() {
+        for location in ["file:///etc/passwd", "ftp://a/", "data:,x", "view-source:http://a/"] {
+            assert!(is_elsewhere(location), "{location}");
+        }
+        for location in ["http://a/", "HTTPS://a/", "/a:b", "../a:b", "a", "", "://a", "1:2"] {
+            assert!(!is_elsewhere(location), "{location}");
+        }
+    }
 
     #[test]
     fn locations_are_of_directories_and_of_manifests() {

@@ -41,3 +41,13 @@ fn bodies_end_with_what_the_manifest_says() {
         assert!(begun.elapsed() < Duration::from_secs(20), "{:?}", begun.elapsed());
     }
 }
+
+#[test]
+fn redirects_lead_to_the_web() {
+    for elsewhere in ["file:///etc/passwd", "ftp://localhost/manifest.json"] {
+        let refused = refusal(Answer::Elsewhere(elsewhere));
+        assert!(refused.contains("neither http nor https"), "{elsewhere}: {refused}");
+    }
+    let refused = refusal(Answer::Elsewhere("/package/manifest.json"));
+    assert!(refused.contains("too many redirects"), "{refused}");
+}
