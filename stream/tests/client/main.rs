@@ -141,7 +141,9 @@ fn what_is_refused_is_played_without() {
             server.requests.lock().unwrap().iter().filter(|request| request.file == "t1.mp4").count();
         // What is not there is asked for three times in all; what fails may be there for the next GOP.
         assert!(refused <= if status == 404 { 3 } else { 3 * outcome.gops.len() }, "{refused} of {status}");
-        let lost: Vec<usize> = outcome.losses.iter().map(|loss| loss.gop).collect();
+        // Each GOP loses it once; one that is improved later may do so after the next.
+        let mut lost: Vec<usize> = outcome.losses.iter().map(|loss| loss.gop).collect();
+        lost.sort_unstable();
         assert!(lost.windows(2).all(|pair| pair[0] < pair[1]), "{lost:?}");
         assert!(
             outcome
