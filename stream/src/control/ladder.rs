@@ -1,6 +1,5 @@
 //! What a player knows of a presentation: per GOP the pieces it can fetch, and what they are worth together.
 
-use std::collections::{HashMap, HashSet};
 use std::fmt;
 
 use super::levels::Levels;
@@ -248,13 +247,14 @@ impl Ladder {
     }
 
     /// All operating points of a GOP whose pieces differ, each under its lowest name. They are as many as what the GOP has can
-    /// make, and the same pieces are found by their hash: a list of many GOPs costs no more than it says of them.
+    /// make, and the same pieces are found in a sorted list: a manifest of many GOPs costs no more than it says of them.
     fn points(&self, gop: &Description) -> Vec<Point> {
         let mut points: Vec<Point> = Vec::new();
-        let mut known: HashSet<Levels> = HashSet::new();
+        let mut known: Vec<Levels> = Vec::new();
         for name in self.names(gop) {
             let Some(levels) = self.levels(name, gop) else { continue };
-            if known.insert(levels.clone()) {
+            if let Err(place) = known.binary_search(&levels) {
+                known.insert(place, levels.clone());
                 points.push(point(name, levels, gop));
             }
         }
@@ -331,14 +331,27 @@ fn point(name: OperatingPoint, levels: Levels, gop: &Description) -> Point {
     point
 }
 
+/// A GOP, or all of them, a point and its quality.
+pub(crate) type QualityRow = (Option<u32>, OperatingPoint, f64);
+
+/// Rows by GOP and point, of each the first. Sorted once, they are found in any number without looking at all of them.
+pub(crate) fn first_of_each(mut rows: Vec<QualityRow>) -> Vec<QualityRow> {
+    rows.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)));
+    rows.dedup_by(|a, b| (a.0, a.1) == (b.0, b.1));
+    rows
+}
+
+/// The quality of a point in rows of one GOP, sorted by point.
+pub(crate) fn quality_of(rows: &[QualityRow], name: OperatingPoint) -> Option<f64> {
+    let place = rows.binary_search_by(|row| row.1.cmp(&name)).ok()?;
+    rows.get(place).map(|row| row.2)
+}
+
 /// Gives points their quality: from the table or, if that lacks one of them, 6 dB per factor of ten in bytes below 36 dB, less
 /// up to 6 dB for frames that stand still.
 fn estimate(points: &mut [Point], table: &[(OperatingPoint, f64)]) {
-    let mut by_name: HashMap<OperatingPoint, f64> = HashMap::new();
-    for &(name, quality) in table {
-        by_name.entry(name).or_insert(quality);
-    }
-    let known = |point: &Point| by_name.get(&point.name).copied();
+    let by_name = first_of_each(table.iter().map(|&(name, quality)| (None, name, quality)).collect());
+    let known = |point: &Point| quality_of(&by_name, point.name);
     let complete = points.iter().all(|point| known(point).is_some());
     let most = real(points.iter().map(|point| point.bytes).max().unwrap_or(1).max(1));
     let all = f64::from(points.iter().map(|point| point.frames).max().unwrap_or(1).max(1));
