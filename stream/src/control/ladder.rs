@@ -336,8 +336,8 @@ pub(crate) type QualityRow = (Option<u32>, OperatingPoint, f64);
 
 /// Rows by GOP and point, of each the first. Sorted once, they are found in any number without looking at all of them.
 pub(crate) fn first_of_each(mut rows: Vec<QualityRow>) -> Vec<QualityRow> {
-    rows.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)));
-    rows.dedup_by(|a, b| (a.0, a.1) == (b.0, b.1));
+    rows.sort_by_key(|row| (row.0, row.1));
+    rows.dedup_by_key(|row| (row.0, row.1));
     rows
 }
 
