@@ -14,28 +14,31 @@ fn numbered(path: &Path) -> Option<(&str, u64, &str)> {
     Some((before, stem.get(before.len()..end)?.parse().ok()?, name.get(end..)?))
 }
 
+/// The numbers of names that are alike but for these; none of others.
+fn of_alike(paths: &[PathBuf]) -> Option<Vec<u64>> {
+    let names: Vec<_> = paths.iter().map(|path| numbered(path)).collect::<Option<_>>()?;
+    let &(before, _, after) = names.first()?;
+    let are_alike = names.iter().all(|name| (name.0, name.2) == (before, after));
+    are_alike.then(|| names.iter().map(|name| name.1).collect())
+}
+
 /// The numbers of frames in names that are alike but for these, if each is larger than the one before. Those of a single file, or
 /// of files that count from 1, may be anything, and are none.
 pub(crate) fn numbers(paths: &[PathBuf]) -> Option<Vec<u32>> {
-    let names: Vec<_> = paths.iter().map(|path| numbered(path)).collect::<Option<_>>()?;
-    let &(before, first, after) = names.first()?;
-    let are_alike = names.iter().all(|name| (name.0, name.2) == (before, after));
-    let are_rising = names.iter().zip(names.iter().skip(1)).all(|(a, b)| a.1 < b.1);
-    let numbers: Vec<u32> = names.iter().map(|name| u32::try_from(name.1)).collect::<Result<_, _>>().ok()?;
-    let counts_from_1 = first == 1 && numbers.iter().zip(1..).all(|(&number, at)| number == at);
-    (are_alike && are_rising && !counts_from_1 && names.len() > 1).then_some(numbers)
+    let numbers = of_alike(paths)?;
+    let are_rising = numbers.is_sorted_by(|a, b| a < b);
+    let counts_from_1 = numbers.iter().zip(1..).all(|(&number, at)| number == at);
+    let may_be_frames = numbers.len() > 1 && are_rising && !counts_from_1;
+    let numbers = numbers.into_iter().map(u32::try_from).collect::<Result<_, _>>().ok()?;
+    may_be_frames.then_some(numbers)
 }
 
 /// What to say where names that are alike but for their numbers leave some out, or have one twice. Numbers rise by the smallest step that at least half
 /// of them have; where no such step is, they are no numbers of frames. `paths` are in natural order.
 pub(crate) fn missing_frames(paths: &[PathBuf]) -> Option<Warning> {
-    let names: Vec<_> = paths.iter().map(|path| numbered(path)).collect::<Option<_>>()?;
-    let &(before, _, after) = names.first()?;
-    if names.iter().any(|name| (name.0, name.2) != (before, after)) {
-        return None;
-    }
+    let numbers = of_alike(paths)?;
     let name = |at: usize| paths.get(at).map(|path| path.display().to_string()).unwrap_or_default();
-    let pairs = || names.iter().zip(names.iter().skip(1)).map(|(a, b)| b.1.saturating_sub(a.1));
+    let pairs = || numbers.iter().zip(numbers.iter().skip(1)).map(|(a, b)| b.saturating_sub(*a));
     if let Some(twice) = pairs().position(|apart| apart == 0) {
         let message = format!(
             "{} and {} have the same number: both are frames of the sequence, and later ones are shown too late",
@@ -45,7 +48,7 @@ pub(crate) fn missing_frames(paths: &[PathBuf]) -> Option<Warning> {
         return Some(Warning::new("missing-frames", message));
     }
     let step = pairs().min()?;
-    if 2 * pairs().filter(|&other| other == step).count() < names.len().saturating_sub(1) {
+    if 2 * pairs().filter(|&other| other == step).count() < numbers.len().saturating_sub(1) {
         return None;
     }
     let missing = pairs().map(|apart| (apart / step).saturating_sub(1)).fold(0, u64::saturating_add);

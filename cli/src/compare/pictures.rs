@@ -7,6 +7,7 @@ use crate::numbers::counted;
 use crate::whole_file::read_whole;
 use clap::Args;
 use serde::Serialize;
+use splatstream_capture::LoadError;
 use splatstream_chart::table::Table;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
@@ -105,12 +106,10 @@ fn refuse_distorted(path: &Path) -> Result<(), Failure> {
     let views = read_views(path).map_err(failed)?.views;
     match views.iter().find(|view| view.is_distorted) {
         None => Ok(()),
-        Some(view) => Err(Failure::other(format!(
-            "{}: the lens of {} bends straight lines, which pictures are drawn without\n  give photographs and cameras without \
-             distortion, as image_undistorter of COLMAP makes them",
-            path.display(),
-            view.camera.name
-        ))),
+        Some(view) => {
+            let error = LoadError::Distorted(view.camera.name.clone());
+            Err(Failure::other(format!("{}: {error}", path.display())))
+        }
     }
 }
 
