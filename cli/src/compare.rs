@@ -10,6 +10,7 @@ use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
+use crate::memory_bound::MemoryBound;
 use crate::numbers::counted;
 use crate::progress::Progress;
 use crate::standard::STANDARD;
@@ -94,27 +95,15 @@ impl Compare {
         let (mut frames_a, mut frames_b) =
             (opened_a.frames(&options, None)?, opened_b.frames(&options, None)?);
         let numbered = number_by_name(&mut frames_a, &mut frames_b);
-        let progress = Progress::frames("comparing", frames_a.expected().max(frames_b.expected()));
         let mut report = self.empty_report();
         let mut sums = ErrorSums::default();
         let description =
             opened_a.description(&options.limits).or_else(|| opened_b.description(&options.limits));
-        let mut pictures = self.pictures.start(description.unwrap_or_default())?;
-        let mut a = next(&mut frames_a, &mut report.frames_a)?;
-        let mut b = next(&mut frames_b, &mut report.frames_b)?;
-        while let Some(order) = order(a.as_ref(), b.as_ref()) {
-            if let (Ordering::Equal, Some((number, a)), Some((_, b))) = (order, &a, &b) {
-                self.frame(*number, [a, b], &mut report, &mut sums, &mut pictures)?;
-            }
-            if order.is_le() {
-                a = next(&mut frames_a, &mut report.frames_a)?;
-            }
-            if order.is_ge() {
-                b = next(&mut frames_b, &mut report.frames_b)?;
-            }
-            progress.at(report.frames_a.max(report.frames_b));
-        }
-        drop(progress);
+        // 0 where it is not known.
+        let is_sequence = [&frames_a, &frames_b].iter().all(|frames| frames.expected() != 1);
+        let memory = MemoryBound::of(self.limits.memory());
+        let mut pictures = self.pictures.start(description.unwrap_or_default(), memory, is_sequence)?;
+        self.frames([&mut frames_a, &mut frames_b], &mut report, &mut sums, &mut pictures)?;
         report.pairs = sums.pairs();
         report.attributes = sums.errors();
         report.pictures = pictures.errors();
@@ -125,6 +114,32 @@ impl Compare {
         notes.for_each(|warning| console.complain(&warning.text()));
         console.report(&report, || report.text())?;
         frames_a.verdict().and_then(|()| frames_b.verdict())
+    }
+
+    /// Compares the frames that both sides have.
+    fn frames(
+        &self,
+        [frames_a, frames_b]: [&mut Frames<'_>; 2],
+        report: &mut Report,
+        sums: &mut ErrorSums,
+        pictures: &mut Pictures<'_>,
+    ) -> Result<(), Failure> {
+        let progress = Progress::frames("comparing", frames_a.expected().max(frames_b.expected()));
+        let mut a = next(frames_a, &mut report.frames_a)?;
+        let mut b = next(frames_b, &mut report.frames_b)?;
+        while let Some(order) = order(a.as_ref(), b.as_ref()) {
+            if let (Ordering::Equal, Some((number, a)), Some((_, b))) = (order, &a, &b) {
+                self.frame(*number, [a, b], report, sums, pictures)?;
+            }
+            if order.is_le() {
+                a = next(frames_a, &mut report.frames_a)?;
+            }
+            if order.is_ge() {
+                b = next(frames_b, &mut report.frames_b)?;
+            }
+            progress.at(report.frames_a.max(report.frames_b));
+        }
+        Ok(())
     }
 
     fn empty_report(&self) -> Report {
@@ -164,7 +179,7 @@ impl Compare {
         report.gaussians_a += a.len() as u64;
         report.gaussians_b += b.len() as u64;
         report.matched_by.push(compare_frames(a, b, self.matching, sums));
-        pictures.add(a, b)
+        pictures.add(number, [a, b])
     }
 }
 

@@ -6,9 +6,11 @@
 use crate::failure::Failure;
 use crate::input_args::parse_size;
 use crate::machine;
+use crate::numbers::counted;
 use crate::over_limit::allow;
 use clap::Args;
 use splatstream_gaussians::{GaussianFrame, sh_planes};
+use splatstream_render::Camera;
 
 /// The option of these commands.
 #[derive(Args, Debug, Clone, Copy)]
@@ -65,6 +67,29 @@ impl MemoryBound {
     }
 }
 
+/// What drawing takes of each pixel, bytes.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PixelBytes {
+    /// Of the picture that is worked on.
+    pub(crate) of_one: u64,
+    /// Of those of all cameras, which stay.
+    pub(crate) of_each: u64,
+}
+
+impl PixelBytes {
+    /// Refuses cameras whose pictures take more than there is.
+    pub(crate) fn check(self, cameras: &[Camera], bound: MemoryBound) -> Result<(), Failure> {
+        let pixels = |camera: &Camera| u64::from(camera.width).saturating_mul(camera.height.into());
+        let Some(largest) = cameras.iter().max_by_key(|camera| pixels(camera)) else { return Ok(()) };
+        let all = cameras.iter().map(pixels).fold(0, u64::saturating_add);
+        let asked =
+            pixels(largest).saturating_mul(self.of_one).saturating_add(all.saturating_mul(self.of_each));
+        let (many, width, height) = (counted(cameras.len() as u64, "picture"), largest.width, largest.height);
+        let what = format!("drawing {many} of up to {width} x {height} pixels");
+        bound.check(asked, &what, "a smaller --height and fewer cameras take less")
+    }
+}
+
 /// Bytes of the values of so many Gaussians.
 pub(crate) fn bytes_of_gaussians(gaussians: u64, sh_degree: u8) -> u64 {
     // Centres, log-scales, rotations, opacities and constant colours, and harmonics.
@@ -80,6 +105,19 @@ pub(crate) fn bytes_of(frame: &GaussianFrame) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_of_all_cameras_count_where_they_stay() {
+        let camera = |side| Camera::of_pose("a".into(), [0.0; 3], [1.0, 0.0, 0.0, 0.0], 1.0, [side; 2]);
+        let cameras = [camera(10), camera(20), camera(10)];
+        let takes = |of_one, of_each, bytes| {
+            PixelBytes { of_one, of_each }.check(&cameras, MemoryBound::of(bytes)).is_ok()
+        };
+        assert!(takes(3, 0, 1200) && !takes(3, 0, 1199));
+        assert!(takes(3, 1, 1800) && !takes(3, 1, 1799));
+        assert!(takes(u64::MAX, 1, u64::MAX) && !takes(u64::MAX, 1, u64::MAX - 1));
+        assert!(PixelBytes { of_one: 1, of_each: 1 }.check(&[], MemoryBound::of(0)).is_ok());
+    }
 
     #[test]
     fn what_is_kept_counts() {

@@ -7,9 +7,10 @@ use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frame_name::{frame_name, is_frame_name};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
+use crate::memory_bound::{MemoryBound, PixelBytes};
 use crate::numbers::{FrameRange, counted, frames};
 use crate::output_directory::{OutputDirectory, files_in, is_numbered};
-use crate::output_file::check_directory;
+use crate::output_file::{OutputFile, check_directory};
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use clap::Args;
@@ -17,6 +18,7 @@ use serde::Serialize;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_gaussians::GaussianFrame;
+use splatstream_render::camera::write_cameras;
 use splatstream_render::{Camera, render};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -27,7 +29,8 @@ use std::time::Instant;
 #[derive(Args)]
 #[command(
     after_help = "Examples:\n  splatstream render garden.gss --camera cameras.json -o pictures/ --height 1080\n  \
-    splatstream render talk.gss --camera ring:4 -o pictures/ --op s0,t0,r0 --frames 0..1"
+    splatstream render talk.gss --camera ring:4 -o pictures/ --op s0,t0,r0 --frames 0..1\n  \
+    splatstream render source.ply --camera ring:8 --write-cameras ring.json -o source/  # then --camera ring.json of another codec's"
 )]
 pub(crate) struct Render {
     /// A stream, a scene file, or a directory of frames; - is a stream or a scene on standard input, but no .splat or .ksplat.
@@ -37,6 +40,9 @@ pub(crate) struct Render {
     /// of the stream, or ring:8.
     #[arg(long, visible_alias = "cameras", value_name = "CAMS.json|ring:N|forward:N")]
     camera: Option<Views>,
+    /// Write the cameras to this file as well, a cameras.json: what other scenes are to be drawn or compared from as this one is.
+    #[arg(long, value_name = "CAMS.json")]
+    write_cameras: Option<PathBuf>,
     /// A directory for the pictures: VIEW.png, of sequences frame_0000_VIEW.png and so on.
     #[arg(short, long = "out", value_name = "DIR")]
     out: PathBuf,
@@ -63,6 +69,9 @@ pub(crate) struct Render {
     #[command(flatten)]
     reading: InputArgs,
 }
+
+/// A pixel that is drawn and written.
+const OF_PIXEL: PixelBytes = PixelBytes { of_one: 24, of_each: 0 };
 
 /// How pictures are drawn, and what is in their way.
 struct Drawing {
@@ -118,26 +127,7 @@ impl Render {
         let expected = frames.expected();
         let progress = Progress::frames("drawing", span.count_in(expected));
         let mut drawn = self.nothing();
-        let inputs = self.inputs(&frames);
-        let mut drawing = None;
-        let mut next = 0;
-        while !span.is_over(next) {
-            let Some((number, frame)) = frames.next()? else { break };
-            let drawing = match &mut drawing {
-                Some(drawing) => drawing,
-                None => {
-                    drawn.assumed_up = self.assumed_up(&frame, &description);
-                    drawing.insert(self.drawing(&frame, &description, &inputs)?)
-                }
-            };
-            if span.contains(number) {
-                let antialiased = frame.antialiased() || self.antialiased;
-                let frame = frame.with_antialiased(antialiased);
-                self.draw(&frame, (number, expected != 1), drawing, &mut drawn)?;
-                progress.at(drawn.frames);
-            }
-            next = number.saturating_add(1);
-        }
+        let drawing = self.draw_all(&mut frames, &description, &progress, &mut drawn)?;
         drop(progress);
         if drawn.frames == 0 {
             frames.verdict()?;
@@ -158,6 +148,38 @@ impl Render {
         frames.verdict()
     }
 
+    /// Draws the frames that are asked for.
+    fn draw_all(
+        &self,
+        frames: &mut Frames<'_>,
+        description: &SceneDescription,
+        progress: &Progress,
+        drawn: &mut Drawn,
+    ) -> Result<Option<Drawing>, Failure> {
+        let (inputs, is_sequence) = (self.inputs(frames), frames.expected() != 1);
+        let span = self.frames.unwrap_or(FrameRange::ALL);
+        let mut drawing = None;
+        let mut next = 0;
+        while !span.is_over(next) {
+            let Some((number, frame)) = frames.next()? else { break };
+            let drawing = match &mut drawing {
+                Some(drawing) => drawing,
+                None => {
+                    drawn.assumed_up = self.assumed_up(&frame, description);
+                    drawing.insert(self.drawing(&frame, description, &inputs)?)
+                }
+            };
+            if span.contains(number) {
+                let antialiased = frame.antialiased() || self.antialiased;
+                let frame = frame.with_antialiased(antialiased);
+                self.draw(&frame, (number, is_sequence), drawing, drawn)?;
+                progress.at(drawn.frames);
+            }
+            next = number.saturating_add(1);
+        }
+        Ok(drawing)
+    }
+
     /// What all pictures have in common; cameras may be made for the first frame. None of `inputs` is replaced.
     fn drawing(
         &self,
@@ -166,8 +188,12 @@ impl Render {
         inputs: &[PathBuf],
     ) -> Result<Drawing, Failure> {
         let cameras = named(self.cameras.cameras(self.camera.as_ref(), first, description)?);
+        OF_PIXEL.check(&cameras, MemoryBound::of(self.limits.memory()))?;
         let pictures = |out: &Path| files_in(out, |path| is_picture(path, &cameras));
         let directory = OutputDirectory::new(&self.out, pictures, "pictures", inputs, self.force)?;
+        if let Some(path) = &self.write_cameras {
+            OutputFile::write_apart(path, inputs, write_cameras(&cameras).as_bytes())?;
+        }
         Ok(Drawing { cameras, background: self.background.colour(description), directory })
     }
 
@@ -186,8 +212,9 @@ impl Render {
 
     /// The files that it reads, and the photographs that a file of cameras names.
     fn inputs(&self, frames: &Frames<'_>) -> Vec<PathBuf> {
-        // Where there is no directory yet, there is nothing to replace.
-        let cameras = self.camera.iter().filter(|_| self.out.is_dir()).flat_map(Views::files);
+        // Where there is neither a directory yet nor a file to write, there is nothing to replace.
+        let may_replace = self.out.is_dir() || self.write_cameras.is_some();
+        let cameras = self.camera.iter().filter(|_| may_replace).flat_map(Views::files);
         frames.inputs().into_iter().chain(cameras).collect()
     }
 

@@ -3,7 +3,9 @@
 mod files;
 mod generated;
 
-pub use files::{CameraError, Capture, CapturedPoint, CapturedView, read_cameras, read_capture, read_views};
+pub use files::{
+    CameraError, Capture, CapturedPoint, CapturedView, read_cameras, read_capture, read_views, write_cameras,
+};
 pub use generated::{Scattered, Up, forward, held_out, held_out_twice, ring, spiral};
 
 use glam::{Mat3, Quat, Vec3};

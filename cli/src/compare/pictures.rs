@@ -3,6 +3,7 @@
 use super::flicker::{Flicker, FlickerSums};
 use crate::cameras::{BackgroundArg, CameraArgs, Views};
 use crate::failure::Failure;
+use crate::memory_bound::{MemoryBound, PixelBytes};
 use crate::numbers::counted;
 use crate::whole_file::read_whole;
 use clap::Args;
@@ -35,6 +36,13 @@ pub(crate) struct PictureArgs {
     photos: Option<PathBuf>,
 }
 
+/// A pixel of a comparison, bytes; more with the learned metric, and with a photograph.
+const OF_COMPARISON: u64 = 64;
+const OF_LEARNED: u64 = 512;
+const OF_PHOTO: u64 = 64;
+/// A pixel of two renderings that are kept.
+const OF_BOTH: u64 = 32;
+
 /// Means over all frames and views; nothing where no cameras are given. A is the reference.
 #[derive(Serialize, Default)]
 pub(super) struct PictureErrors {
@@ -48,8 +56,21 @@ pub(super) struct PictureErrors {
     flicker: Flicker,
     /// Pictures compared.
     pictures: usize,
+    /// Each of them.
+    each_picture: Vec<PictureError>,
     /// Pictures that show nothing of A and nothing of B: they are no part of the means.
     blank_pictures: usize,
+}
+
+/// One picture.
+#[derive(Serialize, Clone)]
+struct PictureError {
+    frame: u32,
+    view: String,
+    #[serde(flatten)]
+    rendered: Figures,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    photos: Option<[Figures; 2]>,
 }
 
 /// The figures of a comparison, all of them null where there is none.
@@ -72,6 +93,11 @@ pub(super) struct Pictures<'a> {
     cameras: Vec<Camera>,
     rendered: Vec<Comparison>,
     photos: [Vec<Comparison>; 2],
+    each: Vec<PictureError>,
+    /// What pictures may take.
+    memory: MemoryBound,
+    /// Whether there may be more than one frame.
+    is_sequence: bool,
     /// The renderings of the frame before, A and B of each camera.
     before: Vec<[Rendering; 2]>,
     flicker: FlickerSums,
@@ -79,8 +105,13 @@ pub(super) struct Pictures<'a> {
 }
 
 impl PictureArgs {
-    /// Ready for the first frame; the weights are read.
-    pub(super) fn start(&self, description: SceneDescription) -> Result<Pictures<'_>, Failure> {
+    /// Ready for the first frame; the weights are read. `is_sequence`: whether there may be another.
+    pub(super) fn start(
+        &self,
+        description: SceneDescription,
+        memory: MemoryBound,
+        is_sequence: bool,
+    ) -> Result<Pictures<'_>, Failure> {
         if let (Some(_), Some(Views::File(path))) = (&self.photos, &self.cameras) {
             refuse_distorted(path)?;
         }
@@ -93,6 +124,9 @@ impl PictureArgs {
             cameras: Vec::new(),
             rendered: Vec::new(),
             photos,
+            each: Vec::new(),
+            memory,
+            is_sequence,
             before: Vec::new(),
             flicker: FlickerSums::default(),
             blank: 0,
@@ -121,36 +155,65 @@ pub(crate) fn read_weights(path: &Path) -> Result<StLpips, Failure> {
 
 impl Pictures<'_> {
     /// Draws and compares one frame of each.
-    pub(super) fn add(&mut self, a: &GaussianFrame, b: &GaussianFrame) -> Result<(), Failure> {
+    pub(super) fn add(&mut self, frame: u32, [a, b]: [&GaussianFrame; 2]) -> Result<(), Failure> {
         let Some(views) = &self.args.cameras else { return Ok(()) };
         if self.cameras.is_empty() {
             self.cameras = self.args.views.cameras(Some(views), a, &self.description)?;
+            self.of_pixel().check(&self.cameras, self.memory)?;
         }
         let background = self.args.background.colour(&self.description);
         let before = core::mem::take(&mut self.before);
         let mut before = before.iter();
-        for camera in &self.cameras {
-            let [a, b] = [a, b].map(|frame| render(frame, camera, background));
+        for view in 0..self.cameras.len() {
+            let Some(camera) = self.cameras.get(view) else { break };
+            let drawn = [a, b].map(|frame| render(frame, camera, background));
             if let Some(before) = before.next() {
-                self.flicker.add(before, [&a, &b]);
+                self.flicker.add(before, drawn.each_ref());
             }
-            // Two pictures of nothing are equal, and say nothing.
-            match [&a, &b].iter().all(|drawn| drawn.alpha.iter().all(|&alpha| alpha <= 0.0)) {
-                true => self.blank += 1,
-                false => {
-                    self.rendered.push(compare(&a.colour, &a.alpha, &b.colour, self.learned.as_ref()));
-                }
+            self.compare(frame, view, &drawn)?;
+            if self.is_sequence {
+                self.before.push(drawn);
             }
-            if let Some(directory) = &self.args.photos {
-                let photo = read_photo(directory, camera)?;
-                let against =
-                    |drawn: &Rendering| compare(&photo, &a.alpha, &drawn.colour, self.learned.as_ref());
-                let [of_a, of_b] = [against(&a), against(&b)];
-                self.photos[0].push(of_a);
-                self.photos[1].push(of_b);
-            }
-            self.before.push([a, b]);
         }
+        Ok(())
+    }
+
+    /// What a pixel takes.
+    fn of_pixel(&self) -> PixelBytes {
+        let learned = if self.learned.is_some() { OF_LEARNED } else { 0 };
+        let photo = if self.args.photos.is_some() { OF_PHOTO } else { 0 };
+        let of_each = if self.is_sequence { OF_BOTH } else { 0 };
+        PixelBytes { of_one: OF_COMPARISON + learned + photo, of_each }
+    }
+
+    /// Compares the renderings of a frame from one of the cameras, with each other and with a photograph.
+    fn compare(&mut self, frame: u32, view: usize, [a, b]: &[Rendering; 2]) -> Result<(), Failure> {
+        let Some(camera) = self.cameras.get(view) else { return Ok(()) };
+        let learned = self.learned.as_ref();
+        let photos = match &self.args.photos {
+            Some(directory) => {
+                let photo = read_photo(directory, camera)?;
+                Some([a, b].map(|drawn| compare(&photo, &a.alpha, &drawn.colour, learned)))
+            }
+            None => None,
+        };
+        if let Some([of_a, of_b]) = photos {
+            self.photos[0].push(of_a);
+            self.photos[1].push(of_b);
+        }
+        // Two pictures of nothing are equal, and say nothing.
+        if [a, b].iter().all(|drawn| drawn.alpha.iter().all(|&alpha| alpha <= 0.0)) {
+            self.blank += 1;
+            return Ok(());
+        }
+        let compared = compare(&a.colour, &a.alpha, &b.colour, learned);
+        self.rendered.push(compared);
+        self.each.push(PictureError {
+            frame,
+            view: camera.name.clone(),
+            rendered: compared.into(),
+            photos: photos.map(|photos| photos.map(Figures::from)),
+        });
         Ok(())
     }
 
@@ -161,6 +224,7 @@ impl Pictures<'_> {
             photos: self.args.photos.as_ref().map(|_| self.photos.each_ref().map(|list| Figures::of(list))),
             flicker: self.flicker.means(),
             pictures: self.rendered.len(),
+            each_picture: self.each.clone(),
             blank_pictures: self.blank,
         }
     }
@@ -190,15 +254,7 @@ fn read_photo(directory: &Path, camera: &Camera) -> Result<Image, Failure> {
 
 impl Figures {
     fn of(pictures: &[Comparison]) -> Self {
-        let Some(mean) = Comparison::mean(pictures) else { return Self::default() };
-        Self {
-            psnr_db: Some(mean.psnr_db),
-            psnr_masked_db: mean.psnr_masked_db,
-            yuv_psnr_db: Some(mean.yuv_psnr_db),
-            ssim: mean.ssim,
-            ssim_masked: mean.ssim_masked,
-            st_lpips: mean.st_lpips,
-        }
+        Comparison::mean(pictures).map(Self::from).unwrap_or_default()
     }
 
     fn row(&self, what: &str) -> [String; 7] {
@@ -214,6 +270,19 @@ impl Figures {
             cell(self.ssim_masked, 4),
             cell(self.st_lpips, 4),
         ]
+    }
+}
+
+impl From<Comparison> for Figures {
+    fn from(compared: Comparison) -> Self {
+        Self {
+            psnr_db: Some(compared.psnr_db),
+            psnr_masked_db: compared.psnr_masked_db,
+            yuv_psnr_db: Some(compared.yuv_psnr_db),
+            ssim: compared.ssim,
+            ssim_masked: compared.ssim_masked,
+            st_lpips: compared.st_lpips,
+        }
     }
 }
 
@@ -244,10 +313,23 @@ impl PictureErrors {
             Table::new(["", "PSNR dB", "covered dB", "YUV dB", "SSIM", "covered SSIM", "ST-LPIPS"]);
         rows.into_iter().for_each(|row| table.row(row));
         format!(
-            "\n{}, means over all of them\n{}{}",
+            "\n{}, means over all of them\n{}{}{}",
             counted(self.pictures as u64, "picture"),
             table.text(),
+            self.lowest(),
             self.flicker.text()
         )
+    }
+
+    /// Which of several pictures is worst.
+    fn lowest(&self) -> String {
+        let of = |picture: &PictureError| picture.rendered.psnr_db.unwrap_or(f64::INFINITY);
+        let worst = self.each_picture.iter().min_by(|a, b| of(a).total_cmp(&of(b)));
+        match worst {
+            Some(worst) if self.each_picture.len() > 1 => {
+                format!("lowest: {:.2} dB, frame {} from {}\n", of(worst), worst.frame, worst.view)
+            }
+            _ => String::new(),
+        }
     }
 }

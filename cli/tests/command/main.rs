@@ -24,6 +24,7 @@ mod missing_units;
 mod outputs;
 mod packages;
 mod parts;
+mod pictures;
 mod play;
 #[cfg(unix)]
 mod readme;

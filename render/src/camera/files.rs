@@ -106,6 +106,24 @@ pub fn read_cameras(path: &Path) -> Result<Vec<Camera>, CameraError> {
     read_views(path).map(cameras_of)
 }
 
+/// A `cameras.json` of these cameras, from which [`read_cameras`] gets the same: INRIA's form, with the principal point as `cx` and
+/// `cy`, which readers that do not know them leave out.
+///
+/// ```
+/// use splatstream_render::Camera;
+/// use splatstream_render::camera::{read_cameras, write_cameras};
+/// let camera = Camera::of_pose("front".into(), [0.0, 0.0, -3.0], [1.0, 0.0, 0.0, 0.0], 0.8, [960, 540]);
+/// let path = std::env::temp_dir().join(format!("splatstream-cameras-{}.json", std::process::id()));
+/// std::fs::write(&path, write_cameras(std::slice::from_ref(&camera)))?;
+/// assert_eq!(read_cameras(&path)?, [camera]);
+/// # std::fs::remove_file(&path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[must_use]
+pub fn write_cameras(cameras: &[Camera]) -> String {
+    json::list(cameras)
+}
+
 /// As [`read_capture`], but without the points of a model of COLMAP, which are most of it.
 ///
 /// # Errors

@@ -32,9 +32,23 @@ pub(super) fn parse(bytes: &[u8], folder: &Path) -> Result<Capture, CameraError>
     })
 }
 
-/// A camera of INRIA's `cameras.json`: `rotation` and `position` lead from the camera to the world.
-#[derive(serde::Deserialize)]
+/// Cameras as a `cameras.json`, as [`parse`] reads it: a camera a line.
+pub(super) fn list(cameras: &[Camera]) -> String {
+    let line = |(id, camera): (usize, &Camera)| {
+        let camera = TrainerCamera::new(id, camera);
+        // Strings and finite numbers are always JSON.
+        serde_json::to_string(&camera).unwrap_or_default()
+    };
+    let lines: Vec<String> = cameras.iter().enumerate().map(line).collect();
+    format!("[\n{}\n]\n", lines.join(",\n"))
+}
+
+/// A camera of INRIA's `cameras.json`: `rotation` and `position` lead from the camera to the world. Their trainer writes no
+/// principal point, which is then in the middle.
+#[derive(serde::Deserialize, serde::Serialize)]
 struct TrainerCamera {
+    #[serde(default, skip_deserializing)]
+    id: usize,
     img_name: Option<String>,
     width: u32,
     height: u32,
@@ -42,16 +56,30 @@ struct TrainerCamera {
     rotation: [[f32; 3]; 3],
     fx: f32,
     fy: f32,
+    #[serde(default)]
+    cx: Option<f32>,
+    #[serde(default)]
+    cy: Option<f32>,
 }
 
 impl TrainerCamera {
+    fn new(id: usize, camera: &Camera) -> Self {
+        let &Camera { width, height, position, focal: [fx, fy], principal: [cx, cy], .. } = camera;
+        let rotation = transposed(camera.rotation);
+        let (img_name, cx, cy) = (Some(camera.name.clone()), Some(cx), Some(cy));
+        Self { id, img_name, width, height, position, rotation, fx, fy, cx, cy }
+    }
+
     fn view(self, at: usize) -> CapturedView {
         let camera = Camera {
             name: self.img_name.clone().unwrap_or_else(|| format!("camera_{at:04}")),
             width: self.width,
             height: self.height,
             focal: [self.fx, self.fy],
-            principal: [0.5 * self.width as f32, 0.5 * self.height as f32],
+            principal: [
+                self.cx.unwrap_or(0.5 * self.width as f32),
+                self.cy.unwrap_or(0.5 * self.height as f32),
+            ],
             rotation: transposed(self.rotation),
             position: self.position,
         };
