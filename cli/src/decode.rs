@@ -6,7 +6,7 @@ mod loss;
 mod report;
 mod target;
 
-pub(crate) use target::frame_directory;
+pub(crate) use target::{frame_directory, has_frames};
 
 use crate::console::Console;
 use crate::failure::Failure;

@@ -2,12 +2,13 @@
 
 mod captures;
 mod report;
+mod settings;
 mod training;
 
 use crate::cameras::BackgroundArg;
 use crate::capture_files::files_of;
 use crate::console::Console;
-use crate::decode::frame_directory;
+use crate::decode::{frame_directory, has_frames};
 use crate::failure::Failure;
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
@@ -97,7 +98,8 @@ pub(crate) struct Fit {
     /// Seconds of training of each frame, after which it is ended as it is. Then the result depends on the machine.
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..))]
     time_budget: Option<u32>,
-    /// Keep frames of a sequence that are there already, as an earlier run with the same settings left them.
+    /// Keep frames of a sequence that are there already, as an earlier run with the same settings left them: the directory has them
+    /// in .splatstream-fit.json, and others are refused.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
     /// Replace the frames of an earlier run in the directory of a sequence: files that have the names that frames are given. They
@@ -178,6 +180,9 @@ impl Fit {
     /// # Errors
     /// Arguments that do not go together.
     fn check(&self, captures: &Captures) -> Result<(), Failure> {
+        if self.resume && !captures.is_sequence() {
+            return Err(Failure::Usage("--resume: only the frames of a sequence are kept".to_owned()));
+        }
         match &self.out {
             None if self.iterations > 0 => Err(Failure::Usage(
                 "there is nowhere to write what is trained: give -o, or --iterations 0 to measure only"
@@ -203,11 +208,14 @@ impl Fit {
     /// The directory of a sequence.
     fn directory(&self, captures: &Captures, inputs: &[PathBuf]) -> Result<Option<OutputDirectory>, Failure> {
         let out = self.out.as_deref().filter(|_| captures.is_sequence());
-        let open = |out| match self.resume {
-            true => OutputDirectory::resumed(out, inputs),
-            false => frame_directory(out, inputs, self.force),
-        };
-        out.map(open).transpose()
+        let Some(out) = out else { return Ok(None) };
+        let settings = self.kept_settings(captures)?;
+        if self.resume {
+            return settings.resume(out, inputs, has_frames).map(Some);
+        }
+        let mut directory = frame_directory(out, inputs, self.force)?;
+        settings.write(&mut directory)?;
+        Ok(Some(directory))
     }
 
     /// The frame of a start that belongs to a capture.

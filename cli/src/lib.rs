@@ -23,6 +23,7 @@ mod frame_name;
 mod frames;
 mod input_args;
 mod inspect;
+mod kept_settings;
 mod likeness;
 mod machine;
 mod manual;

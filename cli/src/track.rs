@@ -1,10 +1,11 @@
 //! `splatstream track`: frames that were trained apart to one sequence.
 
 mod report;
+mod settings;
 
 use crate::cameras::{BackgroundArg, CameraArgs, UpName, Views};
 use crate::console::Console;
-use crate::decode::frame_directory;
+use crate::decode::{frame_directory, has_frames};
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::frame_name::frame_name;
@@ -82,7 +83,8 @@ pub(crate) struct Track {
     /// machines can share the work.
     #[arg(long, value_name = "A..B", value_parser = FrameRange::parse)]
     frames: Option<FrameRange>,
-    /// Keep frames that are there already, as an earlier run with the same settings left them.
+    /// Keep frames that are there already, as an earlier run with the same settings left them: the directory has them in
+    /// .splatstream-track.json, and others are refused.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
     /// Replace the frames of an earlier run in the directory: files that have the names that frames are given. They go when all
@@ -105,10 +107,7 @@ impl Track {
         let inputs = self.files_read(&files);
         check_directory(&self.out, "frames of a sequence")?;
         let span = self.span(files.len())?;
-        let mut directory = match self.resume {
-            true => OutputDirectory::resumed(&self.out, &inputs)?,
-            false => frame_directory(&self.out, &inputs, self.force)?,
-        };
+        let mut directory = self.directory(&files, &inputs)?;
         let first = span.first - span.first % self.gop;
         let mut report = Tracked::new(self.out.clone());
         let mut settings = Following::default();
@@ -135,6 +134,17 @@ impl Track {
         files.warnings().iter().for_each(|warning| console.complain(&warning.text()));
         report.finish(begin.elapsed());
         console.report(&report, || report.text())
+    }
+
+    /// The directory of the frames, with the settings of this run.
+    fn directory(&self, files: &FrameFiles, inputs: &[PathBuf]) -> Result<OutputDirectory, Failure> {
+        let settings = self.kept_settings(files)?;
+        if self.resume {
+            return settings.resume(&self.out, inputs, has_frames);
+        }
+        let mut directory = frame_directory(&self.out, inputs, self.force)?;
+        settings.write(&mut directory)?;
+        Ok(directory)
     }
 
     /// The frames to make, of so many that there are.

@@ -162,6 +162,11 @@ pub(crate) fn frame_directory(
     OutputDirectory::new(path, |path| files_in(path, is_frame), "frames", inputs, force)
 }
 
+/// Whether there are frames in a directory.
+pub(crate) fn has_frames(path: &Path) -> bool {
+    !files_in(path, is_frame).is_empty()
+}
+
 /// Whether a file has a name that frames are given.
 fn is_frame(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str());

@@ -47,6 +47,12 @@ fn a_sequence_is_trained_warm_measured_and_resumed() {
     let resumed = json(&[fit.as_slice(), &["--resume"]].concat());
     assert_eq!((&resumed["frames"][0]["kept"], &resumed["frames"][1]["kept"]), (&true.into(), &false.into()));
     assert!(fs::read(&second).unwrap() == before);
+
+    // Frames of other settings are not kept, and nothing is made beside them.
+    fs::remove_file(&second).unwrap();
+    let said = fail(2, &[fit.as_slice(), &["--resume", "--hold", "0.9"]].concat());
+    assert!(said.contains("hold is 0.9, and was 0.2"), "{said}");
+    assert!(!second.exists());
 }
 
 #[test]

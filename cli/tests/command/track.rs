@@ -88,6 +88,21 @@ fn a_gop_can_be_made_by_itself_again_and_is_the_same() {
         resumed["frames"].as_array().unwrap().iter().map(|frame| frame["kept"] == true).collect();
     assert_eq!(kept, [true, true, false, true, true]);
     assert_eq!(fs::read(&lost).unwrap(), before);
+    // But not with other settings or inputs, and not where nobody knows the settings.
+    let resume = |input: &Path, more: &[&str]| fail(2, &track(input, &out, &[&["--resume"], more].concat()));
+    let said = resume(&apart, &["--hold", "0.5"]);
+    assert!(said.contains("hold is 0.5, and was 0.3") && said.contains("--force"), "{said}");
+    let other = directory.path().join("other");
+    write_apart(&other, 4);
+    let said = resume(&other, &[]);
+    assert!(said.contains("inputs with other names or sizes"), "{said}");
+    fs::remove_file(out.join(".splatstream-track.json")).unwrap();
+    let said = resume(&apart, &[]);
+    assert!(said.contains("no .splatstream-track.json"), "{said}");
+    let tracked = json(&track(&apart, &out, &["--force"]));
+    assert!(tracked["frames"].as_array().unwrap().iter().all(|frame| frame["kept"] == false));
+    let resumed = json(&track(&apart, &out, &["--resume"]));
+    assert!(resumed["frames"].as_array().unwrap().iter().all(|frame| frame["kept"] == true));
 }
 
 #[test]
