@@ -99,7 +99,7 @@ pub(crate) struct Fit {
     #[arg(long, value_name = "S", value_parser = clap::value_parser!(u32).range(1..))]
     time_budget: Option<u32>,
     /// Keep frames of a sequence that are there already, as an earlier run with the same settings left them: the directory has them
-    /// in .splatstream-fit.json, and others are refused.
+    /// in .fit-settings.json, and others are refused.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
     /// Replace the frames of an earlier run in the directory of a sequence: files that have the names that frames are given. They

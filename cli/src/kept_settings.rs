@@ -39,7 +39,7 @@ impl KeptSettings {
         let Value::Object(settings) = value else {
             return Err(Failure::other(format!("the settings of {command} have no names")));
         };
-        Ok(Self { file: format!(".splatstream-{command}.json"), settings })
+        Ok(Self { file: format!(".{command}-settings.json"), settings })
     }
 
     /// Writes them, before the first frame.

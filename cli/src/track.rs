@@ -84,7 +84,7 @@ pub(crate) struct Track {
     #[arg(long, value_name = "A..B", value_parser = FrameRange::parse)]
     frames: Option<FrameRange>,
     /// Keep frames that are there already, as an earlier run with the same settings left them: the directory has them in
-    /// .splatstream-track.json, and others are refused.
+    /// .track-settings.json, and others are refused.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
     /// Replace the frames of an earlier run in the directory: files that have the names that frames are given. They go when all

@@ -337,7 +337,7 @@ fn captures_of_an_earlier_run_are_not_mixed_with_new_ones() {
     let one = [&fit[..], &["--frames", "0..1"]].concat();
     assert!(fail(2, &one).contains("has 2 files with names of frames"));
     succeed(&[&one[..], &["--force"]].concat());
-    assert_eq!(names(&frames), ["frame_0000.ply"]);
+    assert_eq!(names(&frames), [".fit-settings.json", "frame_0000.ply"]);
 }
 
 /// Whether a process has a file open in a directory, with or without a name.

@@ -96,9 +96,9 @@ fn a_gop_can_be_made_by_itself_again_and_is_the_same() {
     write_apart(&other, 4);
     let said = resume(&other, &[]);
     assert!(said.contains("inputs with other names or sizes"), "{said}");
-    fs::remove_file(out.join(".splatstream-track.json")).unwrap();
+    fs::remove_file(out.join(".track-settings.json")).unwrap();
     let said = resume(&apart, &[]);
-    assert!(said.contains("no .splatstream-track.json"), "{said}");
+    assert!(said.contains("no .track-settings.json"), "{said}");
     let tracked = json(&track(&apart, &out, &["--force"]));
     assert!(tracked["frames"].as_array().unwrap().iter().all(|frame| frame["kept"] == false));
     let resumed = json(&track(&apart, &out, &["--resume"]));
