@@ -32,10 +32,10 @@ pub(crate) fn vectorized(task: impl Task) {
     {
         use splatstream_format::entropy::machine::Avx2;
         if let Some(v4) = pulp::x86::V4::try_new() {
-            return Simd::vectorize(v4, OnMachine(task, Avx2(*v4)));
+            return Simd::vectorize(v4, OnMachine(task, Avx2::with_avx512(v4)));
         }
         if let Some(v3) = pulp::x86::V3::try_new() {
-            return Simd::vectorize(v3, OnMachine(task, Avx2(v3)));
+            return Simd::vectorize(v3, OnMachine(task, Avx2::new(v3)));
         }
     }
     #[cfg(all(target_arch = "wasm32", target_feature = "simd128", not(feature = "portable")))]

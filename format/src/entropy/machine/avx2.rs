@@ -1,14 +1,28 @@
 //! The machine of x86 processors with AVX2.
 
-use super::{Machine, WIDE};
+use super::{Machine, STATE_LOW, WIDE};
 use core::arch::x86_64::{__m128i, __m256i};
 use pulp::cast;
 use pulp::core_arch::x86::Avx2 as Instructions;
-use pulp::x86::V3;
+use pulp::x86::{V3, V4};
 
-/// A machine with AVX2.
+/// A machine with AVX2, and how its lanes take words.
 #[derive(Debug, Clone, Copy)]
-pub struct Avx2(pub V3);
+pub struct Avx2<W>(V3, W);
+
+impl Avx2<V3> {
+    /// With no more than that.
+    pub const fn new(v3: V3) -> Self {
+        Self(v3, v3)
+    }
+}
+
+impl Avx2<V4> {
+    /// With AVX-512 for vectors of 256 bits.
+    pub fn with_avx512(v4: V4) -> Self {
+        Self(*v4, v4)
+    }
+}
 
 /// For each set of lanes, as bits, how many lanes of the set come before each lane.
 static BEFORE: [[u8; WIDE]; 256] = before();
@@ -31,6 +45,49 @@ const fn before() -> [[u8; WIDE]; 256] {
     table
 }
 
+/// Instructions by which lanes take words.
+pub trait TakeWords: Copy {
+    /// As [`Machine::advance`].
+    fn advance(self, states: __m256i, next: __m256i, mask: __m256i, words: &[u16; WIDE]) -> (__m256i, usize);
+}
+
+impl TakeWords for V3 {
+    #[inline(always)]
+    fn advance(self, states: __m256i, next: __m256i, mask: __m256i, words: &[u16; WIDE]) -> (__m256i, usize) {
+        let Self { avx, avx2, .. } = self;
+        let high = avx2._mm256_srli_epi32::<16>(next);
+        let low = avx2._mm256_cmpeq_epi32(high, avx._mm256_setzero_si256());
+        let takes = avx2._mm256_and_si256(low, mask);
+        let [set, ..] = avx._mm256_movemask_ps(avx._mm256_castsi256_ps(takes)).to_le_bytes();
+        let before = BEFORE.get(usize::from(set)).copied().unwrap_or_default();
+        let places: __m128i = cast([u64::from_le_bytes(before), 0]);
+        let own = avx2._mm256_permutevar8x32_epi32(
+            avx2._mm256_cvtepu16_epi32(cast(*words)),
+            avx2._mm256_cvtepu8_epi32(places),
+        );
+        let filled = avx2._mm256_or_si256(avx2._mm256_slli_epi32::<16>(next), own);
+        let next = avx2._mm256_blendv_epi8(next, filled, takes);
+        let states = avx2._mm256_blendv_epi8(states, next, mask);
+        (states, usize::try_from(set.count_ones()).unwrap_or(0))
+    }
+}
+
+/// An instruction gives each lane of a mask the next word: no table is asked for places.
+impl TakeWords for V4 {
+    #[inline(always)]
+    fn advance(self, states: __m256i, next: __m256i, mask: __m256i, words: &[u16; WIDE]) -> (__m256i, usize) {
+        let (avx, avx2, avx512) = (self.avx, self.avx2, self.avx512f);
+        let low = avx512._mm256_cmplt_epu32_mask(next, avx._mm256_set1_epi32(STATE_LOW.cast_signed()));
+        let lanes = avx512._mm256_test_epi32_mask(mask, mask);
+        let takes = low & lanes;
+        let own = avx512._mm256_maskz_expand_epi32(takes, avx2._mm256_cvtepu16_epi32(cast(*words)));
+        let filled = avx2._mm256_or_si256(avx2._mm256_slli_epi32::<16>(next), own);
+        let next = avx512._mm256_mask_blend_epi32(takes, next, filled);
+        let states = avx512._mm256_mask_blend_epi32(lanes, states, next);
+        (states, usize::try_from(takes.count_ones()).unwrap_or(0))
+    }
+}
+
 /// The columns of four rows, in each half of 128 bits by itself.
 #[inline(always)]
 fn transpose_four(avx2: Instructions, [a, b, c, d]: [__m256i; 4]) -> [__m256i; 4] {
@@ -44,7 +101,7 @@ fn transpose_four(avx2: Instructions, [a, b, c, d]: [__m256i; 4]) -> [__m256i; 4
     ]
 }
 
-impl Machine for Avx2 {
+impl<W: TakeWords> Machine for Avx2<W> {
     type V = __m256i;
 
     #[inline(always)]
@@ -154,20 +211,6 @@ impl Machine for Avx2 {
 
     #[inline(always)]
     fn advance(self, states: __m256i, next: __m256i, mask: __m256i, words: &[u16; WIDE]) -> (__m256i, usize) {
-        let (avx, avx2) = (self.0.avx, self.0.avx2);
-        let high = avx2._mm256_srli_epi32::<16>(next);
-        let low = avx2._mm256_cmpeq_epi32(high, avx._mm256_setzero_si256());
-        let takes = avx2._mm256_and_si256(low, mask);
-        let [set, ..] = avx._mm256_movemask_ps(avx._mm256_castsi256_ps(takes)).to_le_bytes();
-        let before = BEFORE.get(usize::from(set)).copied().unwrap_or_default();
-        let places: __m128i = cast([u64::from_le_bytes(before), 0]);
-        let own = avx2._mm256_permutevar8x32_epi32(
-            avx2._mm256_cvtepu16_epi32(cast(*words)),
-            avx2._mm256_cvtepu8_epi32(places),
-        );
-        let filled = avx2._mm256_or_si256(avx2._mm256_slli_epi32::<16>(next), own);
-        let next = avx2._mm256_blendv_epi8(next, filled, takes);
-        let states = avx2._mm256_blendv_epi8(states, next, mask);
-        (states, usize::try_from(set.count_ones()).unwrap_or(0))
+        self.1.advance(states, next, mask, words)
     }
 }

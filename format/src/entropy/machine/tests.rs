@@ -5,8 +5,8 @@ use proptest::prelude::*;
 
 /// The vectors of this machine.
 #[cfg(target_arch = "x86_64")]
-fn wide() -> Option<Avx2> {
-    pulp::x86::V3::try_new().map(Avx2)
+fn wide() -> Option<Avx2<pulp::x86::V3>> {
+    pulp::x86::V3::try_new().map(Avx2::new)
 }
 
 /// The vectors of this machine.
@@ -70,8 +70,14 @@ proptest! {
     ) {
         let Some(wide) = wide() else { return Ok(()) };
         let mask: [u32; WIDE] = core::array::from_fn(|lane| (lanes >> lane & 1).wrapping_neg());
+        let expected = Portable.advance(states, next, mask, &words);
         let (advanced, taken) = wide.advance(wide.load(states), wide.load(next), wide.load(mask), &words);
-        prop_assert_eq!((wide.store(advanced), taken), Portable.advance(states, next, mask, &words));
+        prop_assert_eq!((wide.store(advanced), taken), expected);
+        #[cfg(target_arch = "x86_64")]
+        if let Some(wide) = pulp::x86::V4::try_new().map(Avx2::with_avx512) {
+            let (advanced, taken) = wide.advance(wide.load(states), wide.load(next), wide.load(mask), &words);
+            prop_assert_eq!((wide.store(advanced), taken), expected);
+        }
     }
 
     #[test]
