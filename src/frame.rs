@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result, Warning};
 use splatstream_decoder::frame::QuantizedFrame;
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::DecodedFrame;
@@ -37,6 +38,15 @@ pub struct Frame {
     identities: Vec<u32>,
     gaussians: OnceLock<GaussianFrame>,
     warnings: Vec<Warning>,
+    /// Where its planes go when it is dropped.
+    memory: FrameMemory,
+}
+
+impl Drop for Frame {
+    fn drop(&mut self) {
+        self.memory.recycle_integers(core::mem::take(&mut self.integers));
+        self.gaussians.take().into_iter().for_each(|gaussians| self.memory.recycle(gaussians));
+    }
 }
 
 impl Frame {
@@ -45,6 +55,7 @@ impl Frame {
         point: OperatingPoint,
         sequence: SequenceParameters,
         warnings: Vec<Warning>,
+        memory: FrameMemory,
     ) -> Result<Self> {
         decoded.planes.check(sequence.sh_degree).map_err(|error| Error::Broken(error.to_string()))?;
         let (identities, gaussians) = (decoded.identities.len(), decoded.planes.len());
@@ -65,6 +76,7 @@ impl Frame {
             integers: decoded.into_shown(),
             gaussians: OnceLock::new(),
             warnings,
+            memory,
         })
     }
 
@@ -126,13 +138,20 @@ impl Frame {
     /// The Gaussians as f32. The first call computes them, beside the integers; [`Frame::into_gaussians`] needs no second
     /// copy.
     pub fn gaussians(&self) -> &GaussianFrame {
-        self.gaussians.get_or_init(|| computed(self.integers.clone(), &self.sequence))
+        self.gaussians.get_or_init(|| computed(self.memory.copy(&self.integers), &self.sequence))
     }
 
-    /// The Gaussians as f32.
-    pub fn into_gaussians(self) -> GaussianFrame {
-        let Self { gaussians, integers, sequence, .. } = self;
-        gaussians.into_inner().unwrap_or_else(|| computed(integers, &sequence))
+    /// The Gaussians as f32. Whoever gives them back to [`Decoder::recycle`](crate::Decoder::recycle) saves the next frame fresh
+    /// memory.
+    pub fn into_gaussians(mut self) -> GaussianFrame {
+        let integers = core::mem::take(&mut self.integers);
+        match self.gaussians.take() {
+            Some(gaussians) => {
+                self.integers = integers;
+                gaussians
+            }
+            None => computed(integers, &self.sequence),
+        }
     }
 
     /// The Gaussians as integers on the grids of the stream.
@@ -141,8 +160,8 @@ impl Frame {
     }
 
     /// The Gaussians as integers on the grids of the stream.
-    pub fn into_integers(self) -> QuantizedFrame {
-        self.integers
+    pub fn into_integers(mut self) -> QuantizedFrame {
+        core::mem::take(&mut self.integers)
     }
 
     /// The digest of the Gaussians that it shows exactly, as clause 7.9 of the specification defines it: equal digests mean
@@ -198,7 +217,10 @@ mod tests {
         let mut frames = Frames::open(include_bytes!("../examples/talk.gss"), &options).unwrap();
         let decoded = frames.next_frame().unwrap();
         let sequence = *frames.sequence().unwrap();
-        let frame = |decoded| Frame::new(decoded, OperatingPoint::ALL, sequence, Vec::new());
+        let frame = |decoded| {
+            let memory = frames.memory().clone();
+            Frame::new(decoded, OperatingPoint::ALL, sequence, Vec::new(), memory)
+        };
         assert!(frame(decoded.clone()).is_ok());
         let mut without_identity = decoded.clone();
         without_identity.identities.pop();

@@ -18,10 +18,11 @@ use clap::Args;
 use format::Format;
 use loss::Loss;
 use report::{Report, Shown};
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_decoder::operating_point::OperatingPoint;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::{DecodedFrame, Options};
-use splatstream_decoder::stream::{Summary, decode_stream, decode_stream_inside};
+use splatstream_decoder::stream::{Summary, decode_stream_to};
 use splatstream_format::syntax::SequenceParameters;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -90,6 +91,8 @@ struct Decoding<'a> {
     failed: Option<Failure>,
     /// Time in which files were made and written.
     writing: Duration,
+    /// Where frames go that have been written.
+    memory: FrameMemory,
 }
 
 impl Decode {
@@ -201,16 +204,15 @@ impl<'a> Decoding<'a> {
             shown: Shown::default(),
             failed: None,
             writing: Duration::ZERO,
+            memory: FrameMemory::default(),
         }
     }
 
     /// Decodes all of a stream, or from a GOP on.
     fn run(&mut self, bytes: &[u8], seek: Option<Seek>, options: &Options) -> Summary {
+        let memory = self.memory.clone();
         let take = |sequence: &SequenceParameters, frame| self.take(sequence, frame);
-        match seek {
-            None => decode_stream(bytes, options, take),
-            Some(Seek { byte, .. }) => decode_stream_inside(bytes, byte, options, take),
-        }
+        decode_stream_to(&memory, bytes, seek.map(|seek| seek.byte), options, take)
     }
 
     /// Takes a frame out of the decoder; breaks off after the last frame asked for and when a file fails.
@@ -221,6 +223,7 @@ impl<'a> Decoding<'a> {
             self.failed = self.write(sequence, frame).err();
         } else {
             self.passed += frame.planes.len() as u64;
+            self.memory.recycle_integers(frame.planes);
         }
         self.progress.at(number.saturating_add(1));
         if self.failed.is_some() || self.frames.is_over(number.saturating_add(1)) {
@@ -236,6 +239,7 @@ impl<'a> Decoding<'a> {
         let start = Instant::now();
         let written = self.target.as_mut().map_or(Ok(()), |target| target.write(number, &gaussians));
         self.writing += start.elapsed();
+        self.memory.recycle(gaussians);
         written
     }
 

@@ -7,7 +7,8 @@ use crate::progress::Progress;
 use crate::stream_file::{LimitArgs, StreamFile};
 use clap::Args;
 use serde::Serialize;
-use splatstream_decoder::stream::{Summary, decode_stream};
+use splatstream_decoder::frame_memory::FrameMemory;
+use splatstream_decoder::stream::{Summary, decode_stream_to};
 use splatstream_format::Class;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
@@ -47,9 +48,11 @@ impl Validate {
         let frames = stream.frame_count(&options.limits);
         let progress = Progress::frames("checking", frames);
         let mut gaussians = 0;
-        let summary = decode_stream(&stream.bytes, &options, |_, frame| {
+        let memory = FrameMemory::default();
+        let summary = decode_stream_to(&memory, &stream.bytes, None, &options, |_, frame| {
             gaussians += frame.planes.len() as u64;
             progress.at(frame.index.saturating_add(1));
+            memory.recycle_integers(frame.planes);
             ControlFlow::Continue(())
         });
         drop(progress);

@@ -1,6 +1,7 @@
 //! Memory that blocks leave to the blocks after them: fresh memory costs more than what is done with it.
 
 use crate::components::Pair;
+use crate::frame_memory::FrameMemory;
 use crate::interrupt::Interrupt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -33,13 +34,23 @@ impl Buffers {
     }
 }
 
-/// Buffers that no task has: there are as many as tasks have run at a time.
+/// Memory that is left of what was decoded before.
 #[derive(Debug, Default)]
-pub struct BufferPool(Mutex<Vec<Buffers>>);
+pub struct BufferPool {
+    /// Buffers that no task has: there are as many as tasks have run at a time.
+    idle: Mutex<Vec<Buffers>>,
+    /// Planes of frames.
+    pub(crate) frames: FrameMemory,
+}
 
 impl BufferPool {
+    /// Without buffers, and with memory of frames.
+    pub(crate) fn new(frames: FrameMemory) -> Self {
+        Self { idle: Mutex::default(), frames }
+    }
+
     fn idle(&self) -> MutexGuard<'_, Vec<Buffers>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        self.idle.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

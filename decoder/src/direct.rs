@@ -70,7 +70,7 @@ pub(crate) fn decode(
     let lengths: Vec<usize> = blocks.iter().map(|&(.., count)| count).collect();
     let total = lengths.iter().copied().fold(0, usize::saturating_add);
     let sh_planes = usize::from(sequence.sh_dimension());
-    let blank = || QuantizedFrame::zeroed_unless(workspace.interrupt, total, sh_planes);
+    let blank = || workspace.buffers.frames.blank(total, sh_planes, workspace.interrupt);
     let (decoders, mut planes) = cores::join(total.saturating_mul(PLANES), || decoders(&sections), blank);
     let values = planes.values();
     let task = |((unit, bytes, at, _), out)| {

@@ -4,8 +4,9 @@ use crate::cores;
 use crate::interrupt::Interrupt;
 use splatstream_gaussians::{FrameError, MAX_SH_DEGREE, sh_planes};
 
-/// Planes of a frame beside those of SH.
-pub(crate) const PLANES: usize = 13;
+/// Planes of a frame beside those of SH: positions, and others.
+pub(crate) const PLANES: usize = 3 + SIGNED;
+pub(crate) const SIGNED: usize = 10;
 
 /// A reconstructed frame: integers on the grids of the sequence, Gaussians in coded order.
 ///
@@ -56,17 +57,12 @@ fn take<'a, T>(rest: &mut &'a mut [T], length: usize) -> Option<&'a mut [T]> {
 impl QuantizedFrame {
     /// A frame of `count` Gaussians, every integer 0, with `sh_planes` SH planes.
     pub fn zeroed(count: usize, sh_planes: usize) -> Self {
-        Self::zeroed_unless(Interrupt::NEVER, count, sh_planes)
+        let position = [(); 3].map(|()| vec![0; count]);
+        Self::of_planes(position, vec![vec![0; count]; SIGNED.saturating_add(sh_planes)])
     }
 
-    /// The same; where an interrupt is requested, planes are empty.
-    pub(crate) fn zeroed_unless(interrupt: &Interrupt, count: usize, sh_planes: usize) -> Self {
-        let signed = 10_usize.saturating_add(sh_planes);
-        let values = count.saturating_mul(signed.saturating_add(3));
-        let count = || if interrupt.is_requested() { 0 } else { count };
-        let positions = || [(); 3].map(|()| vec![0; count()]);
-        let (position, planes) =
-            cores::join(values, positions, || cores::map(values, vec![(); signed], |()| vec![0; count()]));
+    /// A frame of planes in canonical order.
+    pub(crate) fn of_planes(position: [Vec<u32>; 3], planes: Vec<Vec<i32>>) -> Self {
         let mut planes = planes.into_iter();
         // As many as were asked for.
         let mut next = || planes.next().unwrap_or_default();
@@ -83,7 +79,7 @@ impl QuantizedFrame {
     /// Divides the frame in runs of the given lengths, so that each can be written by itself; none if it is shorter than
     /// these together.
     pub(crate) fn slices(&mut self, lengths: &[usize]) -> Option<Vec<FrameSlice<'_>>> {
-        let planes = 10_usize.saturating_add(self.sh.len());
+        let planes = SIGNED.saturating_add(self.sh.len());
         let mut slices: Vec<FrameSlice<'_>> = lengths
             .iter()
             .map(|_| FrameSlice { position: Vec::with_capacity(3), planes: Vec::with_capacity(planes) })
@@ -193,10 +189,9 @@ impl QuantizedFrame {
         cores::for_each(interrupt, other.values(), planes, |(plane, more)| plane.extend_from_slice(more));
     }
 
-    /// The Gaussians of several frames, which have `sh_planes` SH planes, one after the other. Where an interrupt is
-    /// requested, they mean nothing.
-    pub(crate) fn joined(parts: &[&Self], sh_planes: usize, interrupt: &Interrupt) -> Self {
-        let mut all = Self::zeroed(0, sh_planes);
+    /// The Gaussians of several frames, one after the other, in the memory of `all`, which has as many SH planes as they and no
+    /// Gaussian. Where an interrupt is requested, they mean nothing.
+    pub(crate) fn joined(mut all: Self, parts: &[&Self], interrupt: &Interrupt) -> Self {
         let values = parts.iter().map(|part| part.values()).fold(0, usize::saturating_add);
         let positions: Vec<_> = parts.iter().map(|part| part.position.iter().collect()).collect();
         let joined = all.position.iter_mut().enumerate();

@@ -63,6 +63,7 @@ pub mod displacement;
 mod entropy_state;
 mod fault;
 pub mod frame;
+pub mod frame_memory;
 mod frame_state;
 mod gop;
 pub mod increment;

@@ -1,5 +1,6 @@
 //! A whole stream through a [`Decoder`]: from bytes that are all there, or that arrive in pieces.
 
+use crate::frame_memory::FrameMemory;
 use crate::interrupt::Interrupt;
 use crate::operating_point::OperatingPoint;
 use crate::process::{DecodedFrame, Decoder, Options};
@@ -59,6 +60,7 @@ pub enum Step {
 pub struct StreamDecoder {
     options: Options,
     interrupt: Interrupt,
+    memory: FrameMemory,
     reader: UnitReader,
     /// None before the file header.
     decoder: Option<Decoder>,
@@ -73,7 +75,8 @@ impl StreamDecoder {
         let reader = UnitReader::new(&options.limits);
         let interrupt = Interrupt::default();
         let (decoder, inside) = (None, None);
-        Self { options: *options, interrupt, reader, decoder, inside, frames: 0 }
+        let memory = FrameMemory::default();
+        Self { options: *options, interrupt, memory, reader, decoder, inside, frames: 0 }
     }
 
     /// A decoder of the frames from the GOP on whose header stands at the absolute offset `gop`, as an index gives it
@@ -91,8 +94,8 @@ impl StreamDecoder {
                 self.reader = UnitReader::starting_at(gop, &self.options.limits);
             }
             _ => {
-                let interrupt = self.interrupt.clone();
-                *self = Self { interrupt, ..Self::inside(gop, &self.options) };
+                let (interrupt, memory) = (self.interrupt.clone(), self.memory.clone());
+                *self = Self { interrupt, memory, ..Self::inside(gop, &self.options) };
             }
         }
     }
@@ -201,6 +204,7 @@ impl StreamDecoder {
             None => Decoder::new(file, self.options),
         };
         decoder.set_interrupt(self.interrupt.clone());
+        decoder.set_memory(self.memory.clone());
         self.decoder = Some(decoder);
     }
 
@@ -215,6 +219,17 @@ impl StreamDecoder {
     pub fn set_interrupt(&mut self, interrupt: Interrupt) {
         self.decoder.iter_mut().for_each(|decoder| decoder.set_interrupt(interrupt.clone()));
         self.interrupt = interrupt;
+    }
+
+    /// Memory of frames: what is given back there is written to.
+    pub const fn memory(&self) -> &FrameMemory {
+        &self.memory
+    }
+
+    /// Decodes to memory that others share, such as the decoders of other streams.
+    pub fn set_memory(&mut self, memory: FrameMemory) {
+        self.decoder.iter_mut().for_each(|decoder| decoder.set_memory(memory.clone()));
+        self.memory = memory;
     }
 
     fn unit(&mut self, unit: &Unit<'_>) -> Option<DecodedFrame> {
@@ -302,6 +317,11 @@ impl<'a> Frames<'a> {
         self.decoder.sequence()
     }
 
+    /// Memory of frames: what is given back there is written to.
+    pub const fn memory(&self) -> &FrameMemory {
+        self.decoder.memory()
+    }
+
     /// How decoding went so far.
     pub fn summary(&self) -> Summary {
         self.decoder.summary()
@@ -325,6 +345,36 @@ pub fn decode_stream_inside(
     on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
     run(Frames::open_inside(bytes, gop, options), on_frame)
+}
+
+/// The same from a GOP on if one is given, to memory that whoever needs a frame no more gives it back to.
+///
+/// ```
+/// use core::ops::ControlFlow;
+/// use splatstream_decoder::frame_memory::FrameMemory;
+/// use splatstream_decoder::process::Options;
+/// use splatstream_decoder::stream::decode_stream_to;
+///
+/// let memory = FrameMemory::default();
+/// let summary = decode_stream_to(&memory, &[], None, &Options::default(), |_, frame| {
+///     memory.recycle_integers(frame.planes);
+///     ControlFlow::Continue(())
+/// });
+/// assert!(summary.verdict().is_some());
+/// ```
+pub fn decode_stream_to(
+    memory: &FrameMemory,
+    bytes: &[u8],
+    gop: Option<u64>,
+    options: &Options,
+    on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+) -> Summary {
+    let mut frames = match gop {
+        None => Frames::open(bytes, options),
+        Some(gop) => Frames::open_inside(bytes, gop, options),
+    };
+    frames.iter_mut().for_each(|frames| frames.decoder.set_memory(memory.clone()));
+    run(frames, on_frame)
 }
 
 fn run(

@@ -5,10 +5,11 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
-use splatstream_decoder::stream::decode_stream;
+use splatstream_decoder::stream::{decode_stream, decode_stream_to};
 use splatstream_encoder::{Preset, Settings, Structure, encode};
 use splatstream_files::builtin::BuiltinScene;
 use splatstream_files::{ReadLimits, read_scene};
@@ -63,8 +64,9 @@ fn decode_verify<const VERIFY: usize>(bencher: Bencher, name: &str) {
 
 fn decode(bytes: &[u8], verify: bool) {
     let options = Options { verify, ..Options::default() };
-    let summary = decode_stream(bytes, &options, |sequence, frame| {
-        black_box(to_gaussians(frame.into_shown(), sequence).unwrap());
+    let memory = FrameMemory::default();
+    let summary = decode_stream_to(&memory, bytes, None, &options, |sequence, frame| {
+        memory.recycle(black_box(to_gaussians(frame.into_shown(), sequence).unwrap()));
         ControlFlow::Continue(())
     });
     assert_eq!(summary.verdict(), None);

@@ -19,6 +19,7 @@ mod measured;
 
 use measured::{Result, Seconds, decoded, measured};
 use rayon::{ThreadPool, ThreadPoolBuilder};
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_encoder::{Preset, Quality, Settings, Structure, encode};
 use splatstream_files::{ReadLimits, read_scene};
 use splatstream_gaussians::GaussianFrame;
@@ -44,6 +45,8 @@ struct Scene {
     streams: BTreeMap<String, Vec<u8>>,
     /// Pools of threads, by their number.
     pools: BTreeMap<usize, ThreadPool>,
+    /// What frames are decoded to.
+    memory: FrameMemory,
 }
 
 impl Scene {
@@ -54,7 +57,7 @@ impl Scene {
         if frames.is_empty() {
             return Err("speed FRAME...".into());
         }
-        Ok(Self { frames, streams: BTreeMap::new(), pools: BTreeMap::new() })
+        Ok(Self { frames, streams: BTreeMap::new(), pools: BTreeMap::new(), memory: FrameMemory::default() })
     }
 
     /// Does what a request asks for.
@@ -89,7 +92,8 @@ impl Scene {
         let verify = is_first(digests, "verified", "unverified")?;
         self.fitted(preset)?;
         let stream = self.streams.get(preset).map(Vec::as_slice).unwrap_or_default();
-        let work = || decoded(stream, verify).map_err(|error| error.to_string());
+        let memory = &self.memory;
+        let work = || decoded(stream, verify, memory).map_err(|error| error.to_string());
         let (gaussians, seconds) = in_threads(&mut self.pools, threads, work)?;
         Ok(json(stream.len(), gaussians?, seconds))
     }

@@ -119,6 +119,7 @@ impl Verifier {
         let limits = Limits::of_level(*Limits::LEVELS.end());
         let stream = Stream::open(&bytes, &limits).map_err(Error::Verification)?;
         let mut decoder = Decoder::starting_inside(stream.header(), Options { limits, ..Options::default() });
+        let memory = decoder.memory().clone();
         let mut found: [Option<DecodedFrame>; 3] = [const { None }; 3];
         let mut take = |frame: DecodedFrame| {
             if matches!(taken, Taken::OfEachType) || matches!(taken, Taken::Only(one) if one == frame.index) {
@@ -128,7 +129,10 @@ impl Verifier {
                     FrameType::Predicted => predicted,
                     FrameType::Enhancement => enhancement,
                 };
-                *slot = Some(frame);
+                let before = slot.replace(frame);
+                before.into_iter().for_each(|frame| memory.recycle_integers(frame.planes));
+            } else {
+                memory.recycle_integers(frame.planes);
             }
         };
         let mut units = stream.units();

@@ -216,7 +216,7 @@ fn reference_set_unless(
     let [before, after] = situation.around;
     let parts: Vec<&QuantizedFrame> =
         before.iter().copied().chain([parents]).chain(after.iter().copied()).collect();
-    QuantizedFrame::joined(&parts, parents.sh.len(), interrupt)
+    QuantizedFrame::joined(QuantizedFrame::zeroed(0, parents.sh.len()), &parts, interrupt)
 }
 
 /// Whether a unit leaves its parents as they come and adds nothing.

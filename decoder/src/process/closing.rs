@@ -96,7 +96,7 @@ impl FrameInProgress {
             state.anchor = sequence.whole_anchor().then(|| self.lists.lists.as_slice().into());
             state.is_exact = level == refinements;
         }
-        decoded.planes = self.lists.planes(sh_planes, context.interrupt);
+        decoded.planes = self.lists.planes(sh_planes, context);
         if context.options.identities {
             decoded.identities = self.lists.shown_identities(decoded.planes.len(), context.interrupt)?;
         }
@@ -117,7 +117,7 @@ impl FrameInProgress {
         let level = usize::from(decoded.level);
         let shows_subset = context.options.subset && level > 0;
         let mut difference = None;
-        decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()), context.interrupt);
+        decoded.planes = self.lists.planes(usize::from(context.sequence.sh_dimension()), context);
         if context.options.identities {
             decoded.identities = self.lists.shown_identities(decoded.planes.len(), context.interrupt)?;
             state.identities = self.lists.identities.clone();
@@ -174,12 +174,13 @@ fn show_carried(decoded: &mut DecodedFrame, carried: &mut Carried, interrupt: &I
 
 impl Lists {
     /// The exact Gaussians, list by list.
-    fn planes(&mut self, sh_planes: usize, interrupt: &Interrupt) -> QuantizedFrame {
+    fn planes(&mut self, sh_planes: usize, context: &Context<'_>) -> QuantizedFrame {
         if self.lists.is_empty() && !self.planes.is_empty() {
             return core::mem::take(&mut self.planes);
         }
         let parts: Vec<&QuantizedFrame> = self.lists.iter().map(|list| &list.planes).collect();
-        QuantizedFrame::joined(&parts, sh_planes, interrupt)
+        let blank = context.buffers.frames.blank(0, sh_planes, context.interrupt);
+        QuantizedFrame::joined(blank, &parts, context.interrupt)
     }
 
     /// The identities of the exact Gaussians, of which there are so many. Where an interrupt is requested, some are missing.

@@ -4,6 +4,8 @@ use super::Decoder;
 use super::frame::{DividedUnit, Refused};
 use super::phase::Phase;
 use crate::budget::Shape;
+use crate::buffers::BufferPool;
+use crate::frame_memory::FrameMemory;
 use crate::interrupt::Interrupt;
 use crate::operating_point::OperatingPoint;
 use splatstream_format::syntax::UnitType;
@@ -23,8 +25,19 @@ impl Decoder {
             wanted_point: self.wanted_point,
             interrupt: self.interrupt.clone(),
             next_identity: self.next_identity,
+            buffers: BufferPool::new(self.memory().clone()),
             ..Self::with(self.profile, self.options)
         };
+    }
+
+    /// Memory of frames: what is given back there is written to.
+    pub const fn memory(&self) -> &FrameMemory {
+        &self.buffers.frames
+    }
+
+    /// Decodes to memory that others share.
+    pub(crate) fn set_memory(&mut self, memory: FrameMemory) {
+        self.buffers.frames = memory;
     }
 
     /// Takes the units of another operating point from the next GOP on. Where it is lower on some axis, it holds there from

@@ -1,8 +1,9 @@
 //! What the programs of this folder measure with: seconds of some work, and decoding as a player does it.
 
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
-use splatstream_decoder::stream::decode_stream;
+use splatstream_decoder::stream::decode_stream_to;
 use std::hint::black_box;
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
@@ -37,17 +38,21 @@ pub(crate) fn processor_time() -> Duration {
     Duration::ZERO
 }
 
-/// Decodes all frames of a stream in memory to planes of f32, and says how many Gaussians they have together.
+/// Decodes all frames of a stream in memory to planes of f32, each in the memory of the one before, and says how many Gaussians
+/// they have together.
 ///
 /// # Errors
 /// The stream has a fault.
-pub(crate) fn decoded(stream: &[u8], verify: bool) -> Result<u64> {
+pub(crate) fn decoded(stream: &[u8], verify: bool, memory: &FrameMemory) -> Result<u64> {
     let mut gaussians = 0;
     let mut failed = None;
     let options = Options { verify, ..Options::default() };
-    let summary = decode_stream(black_box(stream), &options, |sequence, frame| {
+    let summary = decode_stream_to(memory, black_box(stream), None, &options, |sequence, frame| {
         match to_gaussians(frame.into_shown(), sequence) {
-            Ok(frame) => gaussians += black_box(frame).len() as u64,
+            Ok(frame) => {
+                gaussians += frame.len() as u64;
+                memory.recycle(black_box(frame));
+            }
             Err(error) => failed = Some(error),
         }
         if failed.is_some() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -14,6 +14,7 @@ mod table;
 use measured::{Result, Seconds, decoded, measured};
 use peak_alloc::PeakAlloc;
 use scenes::Source;
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_encoder::{Preset, Settings, Structure, encode};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -111,7 +112,7 @@ fn row(size: u32, source: &Source) -> Result<Row> {
 /// What decoding costs, digests compared.
 fn decoded_cost(stream: &[u8]) -> Result<Cost> {
     repeated(|| {
-        let (gaussians, seconds) = measured(|| decoded(stream, true));
+        let (gaussians, seconds) = measured(|| decoded(stream, true, &FrameMemory::default()));
         Ok((gaussians?, seconds))
     })
 }

@@ -1,0 +1,141 @@
+//! Memory of frames that nobody needs any more: the frames after them are written to it.
+//!
+//! Fresh memory of a frame is tens of megabytes that the system clears page by page, which takes up to half as long as decoding
+//! does. A frame that was shown is given back instead.
+
+use crate::cores;
+use crate::frame::{PLANES, QuantizedFrame, SIGNED};
+use crate::interrupt::Interrupt;
+use bytemuck::allocation::cast_vec;
+use splatstream_gaussians::{GaussianFrame, Planes};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Planes that are kept: those of two frames of degree 3, since two may be decoded at a time.
+const MOST: usize = 2 * (PLANES + 45);
+
+/// What debug builds fill planes with: nothing may depend on what is in them.
+const JUNK: i32 = 0x5EED_5EED;
+
+/// Planes to be written to, at most those of two frames. Clones share them.
+///
+/// ```
+/// use splatstream_decoder::output::to_gaussians;
+/// use splatstream_decoder::process::Options;
+/// use splatstream_decoder::stream::Frames;
+///
+/// fn show(bytes: &[u8]) -> Result<(), Box<dyn core::error::Error>> {
+///     let mut frames = Frames::open(bytes, &Options::default())?;
+///     while let Some(frame) = frames.next_frame() {
+///         let Some(sequence) = frames.sequence() else { break };
+///         let gaussians = to_gaussians(frame.into_shown(), sequence)?;
+///         println!("{} Gaussians", gaussians.len());
+///         frames.memory().recycle(gaussians);
+///     }
+///     Ok(())
+/// }
+/// # assert!(show(&[]).is_err());
+/// ```
+#[derive(Debug, Clone, Default)]
+pub struct FrameMemory(Arc<Mutex<Vec<Vec<i32>>>>);
+
+impl FrameMemory {
+    /// Takes the memory of a frame.
+    pub fn recycle(&self, frame: GaussianFrame) {
+        let Planes { position, log_scale, rotation: [_, x, y, z], opacity_logit, dc, sh } =
+            frame.into_planes();
+        let planes =
+            position.into_iter().chain(log_scale).chain([x, y, z, opacity_logit]).chain(dc).chain(sh);
+        self.take(planes.map(cast_vec));
+    }
+
+    /// Takes the memory of a frame of integers.
+    pub fn recycle_integers(&self, frame: QuantizedFrame) {
+        let QuantizedFrame { position, log_scale, opacity, rotation, dc, sh } = frame;
+        let signed = log_scale.into_iter().chain([opacity]).chain(rotation).chain(dc).chain(sh);
+        self.take(position.into_iter().map(cast_vec).chain(signed));
+    }
+
+    /// A copy of a frame.
+    #[must_use]
+    pub fn copy(&self, frame: &QuantizedFrame) -> QuantizedFrame {
+        let empty = self.blank(0, frame.sh.len(), Interrupt::NEVER);
+        QuantizedFrame::joined(empty, &[frame], Interrupt::NEVER)
+    }
+
+    /// A frame of `count` Gaussians, whose integers mean nothing. Where an interrupt is requested, planes are empty.
+    pub(crate) fn blank(&self, count: usize, sh_planes: usize, interrupt: &Interrupt) -> QuantizedFrame {
+        let signed = SIGNED.saturating_add(sh_planes);
+        let values = count.saturating_mul(PLANES.saturating_add(sh_planes));
+        let count = || if interrupt.is_requested() { 0 } else { count };
+        let positions = || [(); 3].map(|()| cast_vec(self.plane(count())));
+        let planes = || cores::map(values, vec![(); signed], |()| self.plane(count()));
+        let (position, planes) = cores::join(values, positions, planes);
+        QuantizedFrame::of_planes(position, planes)
+    }
+
+    fn take(&self, planes: impl Iterator<Item = Vec<i32>>) {
+        let mut kept = self.planes();
+        let room = MOST.saturating_sub(kept.len());
+        kept.extend(planes.filter(|plane| plane.capacity() > 0).take(room));
+    }
+
+    /// A plane of so many values, which mean nothing.
+    fn plane(&self, count: usize) -> Vec<i32> {
+        let kept = self.planes().pop();
+        let mut plane = kept.unwrap_or_else(|| vec![0; count]);
+        plane.resize(count, 0);
+        if cfg!(debug_assertions) {
+            plane.fill(JUNK);
+        }
+        plane
+    }
+
+    fn planes(&self) -> MutexGuard<'_, Vec<Vec<i32>>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of degree 1.
+    fn gaussians(count: usize) -> GaussianFrame {
+        let mut planes = Planes::with_capacity(1, 0);
+        planes.iter_mut().for_each(|plane| plane.resize(count, 1.5));
+        GaussianFrame::from_planes(1, planes).unwrap()
+    }
+
+    #[test]
+    fn what_was_recycled_is_written_to_and_no_more_is_kept_than_of_two_frames() {
+        let memory = FrameMemory::default();
+        let frame = gaussians(100);
+        let address = frame.sh().last().map(|plane| plane.as_ptr().addr());
+        memory.recycle(frame);
+        let plane = memory.clone().plane(60);
+        assert_eq!((Some(plane.as_ptr().addr()), plane.len()), (address, 60));
+        (0..9).for_each(|_| memory.recycle(gaussians(5)));
+        assert_eq!(memory.planes().len(), MOST);
+        memory.recycle_integers(QuantizedFrame::zeroed(9, 0));
+        assert_eq!(memory.planes().len(), MOST);
+    }
+
+    #[test]
+    fn planes_without_memory_are_not_kept() {
+        let memory = FrameMemory::default();
+        memory.recycle(gaussians(0));
+        memory.recycle_integers(QuantizedFrame::default());
+        assert!(memory.planes().is_empty());
+        assert_eq!(memory.blank(3, 0, Interrupt::NEVER).len(), 3);
+    }
+
+    #[test]
+    fn a_copy_in_used_memory_is_the_frame() {
+        let memory = FrameMemory::default();
+        memory.recycle(gaussians(7));
+        let mut frame = QuantizedFrame::zeroed(3, 9);
+        frame.signed_planes_mut().zip(1..).for_each(|(plane, value)| plane.fill(value));
+        frame.position[2] = vec![4, 5, 6];
+        assert_eq!(memory.copy(&frame), frame);
+    }
+}
