@@ -50,7 +50,8 @@ impl Colour<'_> {
     ) -> Result<()> {
         let (dc_out, sh_out) = out.split_at_mut_checked(3).unwrap_or_default();
         inverse(self.dc, dc, dc_out, at)?;
-        match (sh, self.sh) {
+        let transform = self.sh.filter(|_| self.mode != ShCoding::None);
+        match (sh, transform) {
             (ShValues::Components(components), Some(transform)) => inverse(transform, components, sh_out, at),
             (ShValues::Indices { planes, exponents }, Some(transform)) => {
                 let entries = self.entries(planes, usize::from(transform.header.rank), at)?;
@@ -59,7 +60,7 @@ impl Colour<'_> {
                 entries.iter().for_each(|plane| components.add(plane, 0, at));
                 inverse(transform, &components, sh_out, at)
             }
-            _ => {
+            (_, None) => {
                 sh_out.iter_mut().for_each(|plane| plane.fill(0));
                 Ok(())
             }

@@ -7,16 +7,13 @@ use crate::cores;
 use crate::frame::{PLANES, QuantizedFrame, SIGNED};
 use crate::interrupt::Interrupt;
 use bytemuck::allocation::cast_vec;
-use splatstream_gaussians::{GaussianFrame, Planes};
+use splatstream_gaussians::GaussianFrame;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-
-/// Planes that are kept: those of two frames of degree 3, since two may be decoded at a time.
-const MOST: usize = 2 * (PLANES + 45);
 
 /// What debug builds fill planes with: nothing may depend on what is in them.
 const JUNK: i32 = 0x5EED_5EED;
 
-/// Planes to be written to, at most those of two frames. Clones share them.
+/// Planes to be written to, at most those of two frames, since two may be decoded at a time. Clones share them.
 ///
 /// ```
 /// use splatstream_decoder::output::to_gaussians;
@@ -39,20 +36,17 @@ const JUNK: i32 = 0x5EED_5EED;
 pub struct FrameMemory(Arc<Mutex<Vec<Vec<i32>>>>);
 
 impl FrameMemory {
-    /// Takes the memory of a frame.
+    /// Takes the memory of a frame, as far as no clone of the frame shares it.
     pub fn recycle(&self, frame: GaussianFrame) {
-        let Planes { position, log_scale, rotation: [_, x, y, z], opacity_logit, dc, sh } =
-            frame.into_planes();
-        let planes =
-            position.into_iter().chain(log_scale).chain([x, y, z, opacity_logit]).chain(dc).chain(sh);
-        self.take(planes.map(cast_vec));
+        self.take(frame.into_memory().into_iter().map(cast_vec).collect());
     }
 
     /// Takes the memory of a frame of integers.
-    pub fn recycle_integers(&self, frame: QuantizedFrame) {
-        let QuantizedFrame { position, log_scale, opacity, rotation, dc, sh } = frame;
-        let signed = log_scale.into_iter().chain([opacity]).chain(rotation).chain(dc).chain(sh);
-        self.take(position.into_iter().map(cast_vec).chain(signed));
+    pub fn recycle_integers(&self, mut frame: QuantizedFrame) {
+        let mut planes: Vec<Vec<i32>> =
+            frame.position.iter_mut().map(core::mem::take).map(cast_vec).collect();
+        planes.extend(frame.signed_planes_mut().map(core::mem::take));
+        self.take(planes);
     }
 
     /// A copy of a frame.
@@ -73,10 +67,15 @@ impl FrameMemory {
         QuantizedFrame::of_planes(position, planes)
     }
 
-    fn take(&self, planes: impl Iterator<Item = Vec<i32>>) {
-        let mut kept = self.planes();
-        let room = MOST.saturating_sub(kept.len());
-        kept.extend(planes.filter(|plane| plane.capacity() > 0).take(room));
+    /// Keeps these planes of a frame, and no more than twice as many.
+    fn take(&self, mut planes: Vec<Vec<i32>>) {
+        planes.retain(|plane| plane.capacity() > 0);
+        let most = planes.len().saturating_mul(2);
+        if most > 0 {
+            let mut kept = self.planes();
+            kept.append(&mut planes);
+            kept.truncate(most);
+        }
     }
 
     /// A plane of so many values, which mean nothing.
@@ -98,6 +97,7 @@ impl FrameMemory {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use splatstream_gaussians::Planes;
 
     /// Of degree 1.
     fn gaussians(count: usize) -> GaussianFrame {
@@ -115,9 +115,17 @@ mod tests {
         let plane = memory.clone().plane(60);
         assert_eq!((Some(plane.as_ptr().addr()), plane.len()), (address, 60));
         (0..9).for_each(|_| memory.recycle(gaussians(5)));
-        assert_eq!(memory.planes().len(), MOST);
+        assert_eq!(memory.planes().len(), 2 * (14 + 9));
+        // One that has fewer.
         memory.recycle_integers(QuantizedFrame::zeroed(9, 0));
-        assert_eq!(memory.planes().len(), MOST);
+        assert_eq!(memory.planes().len(), 2 * PLANES);
+        // One that has none.
+        memory.recycle_integers(QuantizedFrame::default());
+        assert_eq!(memory.planes().len(), 2 * PLANES);
+        // What a clone still shows is not taken.
+        let shown = gaussians(5);
+        FrameMemory::default().recycle(shown.clone());
+        assert_eq!(shown, gaussians(5));
     }
 
     #[test]

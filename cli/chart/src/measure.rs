@@ -8,6 +8,7 @@ use crate::Error;
 use crate::Progress;
 use crate::costs::Costs;
 use crate::decoding::each_frame;
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_decoder::operating_point::{OperatingPoint, OperatingPointInfo, operating_points};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
@@ -159,12 +160,11 @@ pub(crate) fn encoded(
 /// The stream has a fault.
 pub(crate) fn decoded(stream: &[u8], operating_point: OperatingPoint, repeat: u32) -> Result<Timing, Error> {
     let options = Options { operating_point, ..Options::default() };
-    let mut spent = Vec::new();
+    let (mut spent, memory) = (Vec::new(), FrameMemory::default());
     for _ in 0..repeat.max(1) {
         let (result, once) = Spent::of(|| {
-            each_frame(stream, &options, |sequence, frame| {
-                black_box(to_gaussians(frame.into_shown(), sequence)?);
-                Ok(())
+            each_frame(&memory, stream, &options, |sequence, frame| {
+                Ok(black_box(to_gaussians(frame.into_shown(), sequence)?))
             })
         });
         result?;
@@ -183,14 +183,14 @@ fn point(
     let decode = decoded(stream, info.point, repeat)?;
     let mut frames = Vec::new();
     let options = Options { operating_point: info.point, ..Options::default() };
-    each_frame(stream, &options, |sequence, frame| {
+    each_frame(&FrameMemory::default(), stream, &options, |sequence, frame| {
         let parameters = sequence.to_bytes()?;
         let key = (parameters, frame.index, frame.digest.unwrap_or_default());
         let gaussians = to_gaussians(frame.into_shown(), sequence)?;
         let views = judge.views_of(key, &gaussians);
         let shown = gaussians.len() as u64;
         frames.push(FramePoint { gaussians: shown, increment_bytes: 0, bytes: 0, views });
-        Ok(())
+        Ok(gaussians)
     })?;
     add_bytes(stream, info.point, &mut frames)?;
     let views: Vec<Comparison> = frames.iter().flat_map(|frame| frame.views.iter().copied()).collect();

@@ -1,9 +1,11 @@
 //! One result, whichever way it is computed.
 
 use crate::write::{Dice, Plan, Script, decoded};
+use core::ops::ControlFlow;
 use proptest::prelude::*;
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_decoder::process::{DecodedFrame, Options};
-use splatstream_decoder::stream::{Summary, decode_stream_inside};
+use splatstream_decoder::stream::{Summary, decode_stream_inside, decode_stream_to};
 use splatstream_format::syntax::UnitType;
 use std::sync::LazyLock;
 
@@ -28,6 +30,23 @@ fn blocks_that_go_straight_into_planes_give_what_lists_give() {
 }
 
 #[test]
+fn what_was_in_the_memory_of_a_frame_before_changes_nothing() {
+    let memory = FrameMemory::default();
+    for plan in [Plan::intra(3), Plan::predicted(4), Plan { gaussians: 90, ..Plan::intra(0) }, Plan::intra(7)]
+    {
+        let bytes = plan.script().bytes();
+        let (expected, fresh) = decoded(&bytes, &Options::default());
+        let mut frames = Vec::new();
+        let summary = decode_stream_to(&memory, &bytes, None, &Options::default(), |_, frame| {
+            frames.push(frame.clone());
+            memory.recycle_integers(frame.planes);
+            ControlFlow::Continue(())
+        });
+        assert_eq!((summary, frames), (expected, fresh));
+    }
+}
+
+#[test]
 fn the_number_of_threads_changes_nothing() {
     for plan in [Plan::intra(3), Plan::predicted(4)] {
         let bytes = plan.script().bytes();
@@ -46,7 +65,7 @@ fn a_decoder_that_starts_inside_gives_the_frames_from_there_on() {
         let mut frames = Vec::new();
         let summary = decode_stream_inside(&script.bytes(), gop as u64, &Options::default(), |_, frame| {
             frames.push(frame);
-            core::ops::ControlFlow::Continue(())
+            ControlFlow::Continue(())
         });
         assert_eq!((summary.errors, summary.lost), (Vec::new(), Vec::new()));
         assert_eq!(frames, all[plan.gops[0] as usize..]);

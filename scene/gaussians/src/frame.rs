@@ -362,6 +362,24 @@ impl GaussianFrame {
         Planes { position, log_scale, rotation, opacity_logit, dc, sh }
     }
 
+    /// The planes, in any order, as far as no other frame shares them: memory to be used again.
+    pub fn into_memory(self) -> Vec<Vec<f32>> {
+        let mut memory = Vec::new();
+        if let Some(Places { position, opacity_logit }) = Arc::into_inner(self.places) {
+            memory.extend(position);
+            memory.push(opacity_logit);
+        }
+        if let Some(Axes { log_scale, rotation }) = Arc::into_inner(self.axes) {
+            memory.extend(log_scale);
+            memory.extend(rotation);
+        }
+        if let Some(Colours { dc, sh }) = Arc::into_inner(self.colours) {
+            memory.extend(dc);
+            memory.extend(sh);
+        }
+        memory
+    }
+
     /// The Gaussians at `indices`, in that order; an index may come more than once. Planes are gathered side by side: one
     /// core waits for memory most of the time.
     ///

@@ -3,6 +3,7 @@
 use crate::Error;
 use crate::decoding::each_frame;
 use crate::picture_comparison::Judge;
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_decoder::operating_point::{OperatingPoint, extract};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
@@ -95,7 +96,7 @@ pub(crate) fn shown(stream: &[u8], point: OperatingPoint, judge: &mut Judge<'_>)
     let sizes = sizes(stream, point)?;
     let mut frames = Vec::new();
     let options = Options { operating_point: point, ..Options::default() };
-    each_frame(stream, &options, |sequence, frame| {
+    each_frame(&FrameMemory::default(), stream, &options, |sequence, frame| {
         let (number, frame_type) = (frame.index, frame.frame_type);
         let (gaussians, carried) = ((frame.planes.len() - frame.carried) as u64, frame.carried);
         let mut key = sequence.to_bytes()?;
@@ -106,7 +107,7 @@ pub(crate) fn shown(stream: &[u8], point: OperatingPoint, judge: &mut Judge<'_>)
         let views = if carried > 0 { judge.views(number, &shown) } else { judge.views_of(key, &shown) };
         let bytes = sizes.get(&number).copied().unwrap_or_default();
         frames.push(ShownFrame { number, frame_type, bytes, gaussians, views });
-        Ok(())
+        Ok(shown)
     })?;
     frames.sort_by_key(|frame| frame.number);
     Ok(Shown { frames })

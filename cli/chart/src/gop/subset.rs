@@ -6,6 +6,7 @@ use crate::Error;
 use crate::decoding::each_frame;
 use crate::levels::Subset;
 use crate::picture_comparison::Judge;
+use splatstream_decoder::frame_memory::FrameMemory;
 use splatstream_decoder::operating_point::{OperatingPointInfo, operating_points};
 use splatstream_decoder::output::to_gaussians;
 use splatstream_decoder::process::Options;
@@ -31,11 +32,12 @@ pub(super) fn subsets(
 fn subset(stream: &[u8], info: OperatingPointInfo, judge: &Judge<'_>) -> Result<Subset, Error> {
     let mut views = Vec::new();
     let options = Options { operating_point: info.point, ..Options::default() };
-    each_frame(stream, &options, |sequence, frame| {
+    each_frame(&FrameMemory::default(), stream, &options, |sequence, frame| {
         // The stream lacks the first frame of the sequence.
         let number = frame.index + 1;
-        views.extend(judge.views(number, &to_gaussians(frame.into_shown(), sequence)?));
-        Ok(())
+        let shown = to_gaussians(frame.into_shown(), sequence)?;
+        views.extend(judge.views(number, &shown));
+        Ok(shown)
     })?;
     Ok(Subset { bytes: info.bytes, gaussians: info.gaussians, figures: mean(views.into_iter())? })
 }

@@ -9,7 +9,8 @@ use crate::predictor::EXP;
 
 impl<P: Products> OneBatch<'_, P> {
     /// Adds its context to a row. `m` is its neighbour; none: it is that of the new Gaussian.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     pub(super) fn attend(&self, row: &mut [Lane], m: Option<usize>, h: &[Lane], sums: &mut Sums) {
         let network = self.network;
         let shift = self.shift(2);

@@ -8,7 +8,8 @@ use crate::transformer::scalar::reciprocal;
 
 impl<P: Products> OneBatch<'_, P> {
     /// Brings a row to its end.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     pub(super) fn finish(&self, row: &mut [Lane], sums: &mut Sums) {
         let network = self.network;
         if network.header.normalised() {

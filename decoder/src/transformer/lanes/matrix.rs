@@ -43,7 +43,8 @@ impl Matrix {
     }
 
     /// As [`Self::multiply`], with other biases.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     pub(super) fn multiply_from<P: Products>(
         &self,
         by: P,
