@@ -2,7 +2,7 @@
 
 use crate::Cancel;
 use crate::error::{Error, Result, Warning};
-use crate::frame::{Frame, highest_point, time_of};
+use crate::frame::{Frame, time_of};
 use crate::limits::Limits;
 use crate::source::{Source, Window};
 use splatstream_decoder::operating_point::OperatingPoint;
@@ -413,7 +413,7 @@ impl Decoder {
 
     /// The operating point of everything that the stream has, once the sequence parameters have come.
     pub fn highest_point(&self) -> Option<OperatingPoint> {
-        self.stream.sequence().map(highest_point)
+        self.stream.sequence().map(OperatingPoint::highest)
     }
 
     /// From a frame to the next at the full frame rate, once the sequence parameters have come.

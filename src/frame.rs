@@ -65,7 +65,7 @@ impl Frame {
         Ok(Self {
             index: decoded.index,
             kind: decoded.frame_type,
-            point: point.at_most(highest_point(&sequence)),
+            point: point.at_most(OperatingPoint::highest(&sequence)),
             digest: decoded.digest,
             bytes: decoded.bytes,
             refinements: decoded.level,
@@ -179,15 +179,6 @@ impl Frame {
     /// but for what follows the last frame, which is [`Error::Incomplete`](crate::Error::Incomplete).
     pub fn warnings(&self) -> &[Warning] {
         &self.warnings
-    }
-}
-
-/// The operating point of everything that a stream has.
-pub(crate) fn highest_point(sequence: &SequenceParameters) -> OperatingPoint {
-    OperatingPoint {
-        spatial: sequence.spatial_layer_count.saturating_sub(1),
-        temporal: sequence.temporal_layer_count.saturating_sub(1),
-        refinement: sequence.refinement_count.saturating_sub(1),
     }
 }
 

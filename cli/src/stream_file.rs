@@ -178,7 +178,7 @@ impl StreamFile {
 
     /// The operating point of all that the stream has.
     pub(crate) fn highest_point(&self, limits: &Limits) -> OperatingPoint {
-        self.sequence(limits).map_or(OperatingPoint::ALL, |sequence| highest_point(&sequence))
+        self.sequence(limits).map_or(OperatingPoint::ALL, |sequence| OperatingPoint::highest(&sequence))
     }
 
     /// Refuses an operating point that the stream cannot have: it would silently be another one.
@@ -186,27 +186,15 @@ impl StreamFile {
         let Some(sequence) = self.sequence(limits) else {
             return Ok(());
         };
-        let has = |value: u8, count: u8| value == u8::MAX || value < count;
-        if has(point.spatial, sequence.spatial_layer_count)
-            && has(point.temporal, sequence.temporal_layer_count)
-            && has(point.refinement, sequence.refinement_count)
-        {
+        let last = OperatingPoint::highest(&sequence);
+        if point.is_within(last) {
             return Ok(());
         }
-        let last = highest_point(&sequence);
         let path = self.path.display();
         Err(Failure::Usage(format!(
             "{path}: there is no operating point {point}; the points go from s0,t0,r0 to {last}: \
              `splatstream inspect --ops {path}` lists them"
         )))
-    }
-}
-
-fn highest_point(sequence: &SequenceParameters) -> OperatingPoint {
-    OperatingPoint {
-        spatial: sequence.spatial_layer_count.saturating_sub(1),
-        temporal: sequence.temporal_layer_count.saturating_sub(1),
-        refinement: sequence.refinement_count.saturating_sub(1),
     }
 }
 

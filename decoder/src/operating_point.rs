@@ -8,7 +8,9 @@ use core::fmt;
 use core::str::FromStr;
 use splatstream_format::follower::Follower;
 use splatstream_format::payload::{Index, OperatingPoints};
-use splatstream_format::syntax::{EndOfStream, IndexEntry, OperatingPointEntry, UnitHeader, UnitType};
+use splatstream_format::syntax::{
+    EndOfStream, IndexEntry, OperatingPointEntry, SequenceParameters, UnitHeader, UnitType,
+};
 use splatstream_format::unit::Stream;
 use splatstream_format::{Limits, Result as FormatResult};
 
@@ -26,6 +28,34 @@ pub struct OperatingPoint {
 impl OperatingPoint {
     /// Everything in the stream.
     pub const ALL: Self = Self { spatial: u8::MAX, temporal: u8::MAX, refinement: u8::MAX };
+
+    /// Everything that a sequence has.
+    pub const fn highest(sequence: &SequenceParameters) -> Self {
+        Self {
+            spatial: sequence.spatial_layer_count.saturating_sub(1),
+            temporal: sequence.temporal_layer_count.saturating_sub(1),
+            refinement: sequence.refinement_count.saturating_sub(1),
+        }
+    }
+
+    /// Whether there is this point in a sequence whose highest one is given. 255 on an axis is all that there is.
+    ///
+    /// ```
+    /// use splatstream_decoder::operating_point::OperatingPoint;
+    ///
+    /// let highest = OperatingPoint { spatial: 1, temporal: 0, refinement: 4 };
+    /// let lower = OperatingPoint { refinement: 2, ..highest };
+    /// assert!(lower.is_within(highest) && OperatingPoint::ALL.is_within(highest));
+    /// assert!(!highest.is_within(lower));
+    /// ```
+    pub const fn is_within(self, highest: Self) -> bool {
+        const fn has(value: u8, highest: u8) -> bool {
+            value == u8::MAX || value <= highest
+        }
+        has(self.spatial, highest.spatial)
+            && has(self.temporal, highest.temporal)
+            && has(self.refinement, highest.refinement)
+    }
 
     /// The lower of two on each axis.
     #[must_use]

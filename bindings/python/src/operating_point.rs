@@ -35,14 +35,10 @@ impl<'py> FromPyObject<'_, 'py> for Point {
     }
 }
 
-/// Why a stream that goes up to a point has no such point; none if it has. 255 on an axis is all that it has there.
+/// Why a stream that goes up to a point has no such point; none if it has.
 pub(crate) fn refused(point: OperatingPoint, highest: OperatingPoint) -> Option<PyErr> {
-    let has = |value: u8, highest: u8| value == u8::MAX || value <= highest;
-    let has_all = has(point.spatial, highest.spatial)
-        && has(point.temporal, highest.temporal)
-        && has(point.refinement, highest.refinement);
     let message = || format!("there is no operating point {point}; the points go from s0,t0,r0 to {highest}");
-    (!has_all).then(|| PyValueError::new_err(message()))
+    (!point.is_within(highest)).then(|| PyValueError::new_err(message()))
 }
 
 /// The class of operating points.
