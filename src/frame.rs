@@ -203,6 +203,31 @@ mod tests {
     use splatstream_decoder::stream::Frames;
 
     #[test]
+    fn planes_go_to_the_memory_unless_they_were_handed_out() {
+        const fn can_be_sent<T: Send + Sync>() {}
+        can_be_sent::<Frame>();
+        let decoder = crate::Decoder::from_bytes(include_bytes!("../examples/talk.gss").to_vec());
+        let mut frames = decoder.map(|frame| frame.unwrap());
+        let planes = |frame: &Frame| frame.memory.clone();
+        let count = |memory: &FrameMemory| format!("{memory:?}");
+        let first = frames.next().unwrap();
+        let memory = planes(&first);
+        let kept = first.gaussians().clone();
+        drop(first);
+        // Those of integers; a clone has the others.
+        let of_one = count(&memory);
+        assert_ne!(of_one, count(&FrameMemory::default()));
+        let integers = frames.next().unwrap().into_integers();
+        let gaussians = frames.next().unwrap().into_gaussians();
+        assert_eq!(count(&memory), count(&FrameMemory::default()), "all are in use");
+        memory.recycle(kept);
+        assert_eq!(count(&memory), of_one);
+        memory.recycle_integers(integers);
+        memory.recycle(gaussians);
+        assert_ne!(count(&memory), of_one);
+    }
+
+    #[test]
     fn a_frame_whose_parts_do_not_fit_is_broken() {
         let options = Options { identities: true, ..Options::default() };
         let mut frames = Frames::open(include_bytes!("../examples/talk.gss"), &options).unwrap();

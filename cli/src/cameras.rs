@@ -3,12 +3,13 @@
 use crate::capture_files::files_at;
 use crate::failure::Failure;
 use clap::{Args, ValueEnum};
+use splatstream_capture::LoadError;
 use splatstream_encoder::up_of;
 use splatstream_format::payload::{SceneDescription, UpAxis};
 use splatstream_format::syntax::Camera as StreamCamera;
 use splatstream_gaussians::GaussianFrame;
 use splatstream_render::Camera;
-use splatstream_render::camera::{Up, forward, read_cameras, ring};
+use splatstream_render::camera::{Up, forward, read_cameras, read_views, ring};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -185,6 +186,20 @@ impl CameraArgs {
             None => cameras,
             Some(height) => cameras.iter().map(|camera| camera.scaled_to_height(height)).collect(),
         })
+    }
+}
+
+/// Refuses cameras whose lenses bend lines, where they stand for more than a pose: pictures are drawn without that, so that
+/// photographs differ from any scene, and files of pinholes do not say it.
+pub(crate) fn refuse_distorted(path: &Path) -> Result<(), Failure> {
+    let failed = |error| Failure::other(format!("{}: {error}", path.display()));
+    let views = read_views(path).map_err(failed)?.views;
+    match views.iter().find(|view| view.is_distorted) {
+        None => Ok(()),
+        Some(view) => {
+            let error = LoadError::Distorted(view.camera.name.clone());
+            Err(Failure::other(format!("{}: {error}", path.display())))
+        }
     }
 }
 

@@ -61,6 +61,18 @@ impl OutputDirectory {
         !self.earlier.is_empty()
     }
 
+    /// Files that go with those of the earlier run, or at once where it has left no others.
+    pub(crate) fn replace_too(&mut self, files: impl Iterator<Item = PathBuf>) -> Result<(), Failure> {
+        if self.replaces() {
+            self.earlier.extend(files);
+            return Ok(());
+        }
+        let remove = |file: PathBuf| {
+            std::fs::remove_file(&file).map_err(|error| Failure::file("remove", &file, &error))
+        };
+        files.into_iter().try_for_each(remove)
+    }
+
     /// The directory.
     pub(crate) fn path(&self) -> &Path {
         &self.path

@@ -1,16 +1,16 @@
 //! `splatstream render`: frames to pictures.
 
 use crate::assumed_up::AssumedUp;
-use crate::cameras::{BackgroundArg, CameraArgs, Views};
+use crate::cameras::{BackgroundArg, CameraArgs, Views, refuse_distorted};
 use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frame_name::{frame_name, is_frame_name};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
-use crate::memory_bound::{MemoryBound, PixelBytes};
+use crate::memory_bound::{MemoryBound, PixelBytes, bytes_of};
 use crate::numbers::{FrameRange, counted, frames};
 use crate::output_directory::{OutputDirectory, files_in, is_numbered};
-use crate::output_file::{OutputFile, check_directory};
+use crate::output_file::{OutputFile, check_directory, refuse_inputs, refuse_standard};
 use crate::progress::Progress;
 use crate::stream_file::LimitArgs;
 use clap::Args;
@@ -30,7 +30,8 @@ use std::time::Instant;
 #[command(
     after_help = "Examples:\n  splatstream render garden.gss --camera cameras.json -o pictures/ --height 1080\n  \
     splatstream render talk.gss --camera ring:4 -o pictures/ --op s0,t0,r0 --frames 0..1\n  \
-    splatstream render source.ply --camera ring:8 --write-cameras ring.json -o source/  # then --camera ring.json of another codec's"
+    splatstream render source.ply --camera ring:8 --write-cameras ring.json -o source/\n  \
+    splatstream render decoded.ply --camera ring.json -o decoded/  # what another codec has made of it, from the same cameras"
 )]
 pub(crate) struct Render {
     /// A stream, a scene file, or a directory of frames; - is a stream or a scene on standard input, but no .splat or .ksplat.
@@ -71,7 +72,7 @@ pub(crate) struct Render {
 }
 
 /// A pixel that is drawn and written.
-const OF_PIXEL: PixelBytes = PixelBytes { of_one: 24, of_each: 0 };
+const OF_PIXEL: PixelBytes = PixelBytes { of_one: 32, of_each: 0 };
 
 /// How pictures are drawn, and what is in their way.
 struct Drawing {
@@ -119,6 +120,7 @@ impl Render {
     /// Draws every frame from every camera.
     pub(crate) fn run(&self, console: &Console) -> Result<(), Failure> {
         check_directory(&self.out, "pictures")?;
+        self.check_cameras_file()?;
         let opened = Opened::open(&self.input, self.reading)?;
         let options = self.limits.options_to_draw();
         let description = opened.description(&options.limits).unwrap_or_default();
@@ -135,17 +137,31 @@ impl Render {
         }
         drawn.expected = expected;
         drawn.seconds = drawn.pictures.iter().map(|picture| picture.seconds).sum();
-        if let Some(Drawing { directory, .. }) = drawing {
+        if let Some(Drawing { directory, cameras, .. }) = drawing {
             // Pictures of a stream with errors replace none.
             if directory.replaces() {
                 frames.verdict()?;
             }
             directory.finish()?;
+            if let Some(path) = &self.write_cameras {
+                OutputFile::write(path, write_cameras(&cameras).as_bytes())?;
+            }
         }
         drawn.errors = frames.faults();
         frames.warnings().iter().for_each(|warning| console.complain(&warning.text()));
         console.report(&drawn, || drawn.text())?;
         frames.verdict()
+    }
+
+    /// Refuses cameras to be written that are no file, or none of pinholes.
+    fn check_cameras_file(&self) -> Result<(), Failure> {
+        match (&self.write_cameras, &self.camera) {
+            (Some(path), Some(Views::File(cameras))) => {
+                refuse_standard(path).and_then(|()| refuse_distorted(cameras))
+            }
+            (Some(path), _) => refuse_standard(path),
+            (None, _) => Ok(()),
+        }
     }
 
     /// Draws the frames that are asked for.
@@ -188,12 +204,13 @@ impl Render {
         inputs: &[PathBuf],
     ) -> Result<Drawing, Failure> {
         let cameras = named(self.cameras.cameras(self.camera.as_ref(), first, description)?);
-        OF_PIXEL.check(&cameras, MemoryBound::of(self.limits.memory()))?;
+        let mut memory = MemoryBound::of(self.limits.memory());
+        memory.keep(bytes_of(first));
+        OF_PIXEL.check(&cameras, memory)?;
+        let cameras_file = self.write_cameras.as_ref().map(|path| refuse_inputs(path, inputs));
+        cameras_file.unwrap_or(Ok(()))?;
         let pictures = |out: &Path| files_in(out, |path| is_picture(path, &cameras));
         let directory = OutputDirectory::new(&self.out, pictures, "pictures", inputs, self.force)?;
-        if let Some(path) = &self.write_cameras {
-            OutputFile::write_apart(path, inputs, write_cameras(&cameras).as_bytes())?;
-        }
         Ok(Drawing { cameras, background: self.background.colour(description), directory })
     }
 

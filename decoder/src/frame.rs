@@ -189,8 +189,8 @@ impl QuantizedFrame {
         cores::for_each(interrupt, other.values(), planes, |(plane, more)| plane.extend_from_slice(more));
     }
 
-    /// The Gaussians of several frames, one after the other, in the memory of `all`, which has as many SH planes as they and no
-    /// Gaussian. Where an interrupt is requested, they mean nothing.
+    /// The Gaussians of several frames, one after the other, in the memory of `all`, which has as many SH planes as they, and loses
+    /// its own. Where an interrupt is requested, they mean nothing.
     pub(crate) fn joined(mut all: Self, parts: &[&Self], interrupt: &Interrupt) -> Self {
         let values = parts.iter().map(|part| part.values()).fold(0, usize::saturating_add);
         let positions: Vec<_> = parts.iter().map(|part| part.position.iter().collect()).collect();
@@ -218,8 +218,9 @@ impl QuantizedFrame {
     }
 }
 
-/// Fills an empty plane with those at its index of all parts.
+/// Makes a plane of those at its index of all parts.
 fn join<T: Copy>(plane: &mut Vec<T>, parts: &[Vec<&Vec<T>>], index: usize) {
+    plane.clear();
     let own = || parts.iter().filter_map(|part| part.get(index));
     plane.reserve_exact(own().map(|part| part.len()).fold(0, usize::saturating_add));
     own().for_each(|part| plane.extend_from_slice(part));

@@ -7,13 +7,17 @@ use crate::cores;
 use crate::frame::{PLANES, QuantizedFrame, SIGNED};
 use crate::interrupt::Interrupt;
 use bytemuck::allocation::cast_vec;
+use core::fmt;
 use splatstream_gaussians::GaussianFrame;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What debug builds fill planes with: nothing may depend on what is in them.
 const JUNK: i32 = 0x5EED_5EED;
 
-/// Planes to be written to, at most those of two frames, since two may be decoded at a time. Clones share them.
+/// Planes that later frames are decoded to, at most as many as two frames have, since two may be decoded at a time. Clones share
+/// them.
+///
+/// What is here was the caller's before, and no budget counts it: whoever gives frames back one by one has no more than without.
 ///
 /// ```
 /// use splatstream_decoder::output::to_gaussians;
@@ -32,8 +36,14 @@ const JUNK: i32 = 0x5EED_5EED;
 /// }
 /// # assert!(show(&[]).is_err());
 /// ```
-#[derive(Debug, Clone, Default)]
+#[derive(Clone, Default)]
 pub struct FrameMemory(Arc<Mutex<Vec<Vec<i32>>>>);
+
+impl fmt::Debug for FrameMemory {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.debug_struct("FrameMemory").field("planes", &self.planes().len()).finish()
+    }
+}
 
 impl FrameMemory {
     /// Takes the memory of a frame, as far as no clone of the frame shares it.
@@ -52,8 +62,8 @@ impl FrameMemory {
     /// A copy of a frame.
     #[must_use]
     pub fn copy(&self, frame: &QuantizedFrame) -> QuantizedFrame {
-        let empty = self.blank(0, frame.sh.len(), Interrupt::NEVER);
-        QuantizedFrame::joined(empty, &[frame], Interrupt::NEVER)
+        let blank = self.blank(frame.len(), frame.sh.len(), Interrupt::NEVER);
+        QuantizedFrame::joined(blank, &[frame], Interrupt::NEVER)
     }
 
     /// A frame of `count` Gaussians, whose integers mean nothing. Where an interrupt is requested, planes are empty.
@@ -67,20 +77,21 @@ impl FrameMemory {
         QuantizedFrame::of_planes(position, planes)
     }
 
-    /// Keeps these planes of a frame, and no more than twice as many.
+    /// Keeps these planes of a frame, and of those before no more than as many, and none that is far larger.
     fn take(&self, mut planes: Vec<Vec<i32>>) {
         planes.retain(|plane| plane.capacity() > 0);
-        let most = planes.len().saturating_mul(2);
-        if most > 0 {
-            let mut kept = self.planes();
-            kept.append(&mut planes);
-            kept.truncate(most);
-        }
+        let Some(count) = planes.first().map(Vec::len) else { return };
+        let mut kept = self.planes();
+        kept.retain(|plane| is_fit(plane, count));
+        let most = planes.len();
+        let surplus = kept.len().saturating_sub(most);
+        kept.drain(..surplus);
+        kept.append(&mut planes);
     }
 
     /// A plane of so many values, which mean nothing.
     fn plane(&self, count: usize) -> Vec<i32> {
-        let kept = self.planes().pop();
+        let kept = self.planes().pop().filter(|plane| is_fit(plane, count));
         let mut plane = kept.unwrap_or_else(|| vec![0; count]);
         plane.resize(count, 0);
         if cfg!(debug_assertions) {
@@ -92,6 +103,11 @@ impl FrameMemory {
     fn planes(&self) -> MutexGuard<'_, Vec<Vec<i32>>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+/// Whether a plane has room for so many values, and not for more than twice as many.
+fn is_fit(plane: &Vec<i32>, count: usize) -> bool {
+    (count..=count.saturating_mul(2)).contains(&plane.capacity())
 }
 
 #[cfg(test)]
@@ -114,17 +130,20 @@ mod tests {
         memory.recycle(frame);
         let plane = memory.clone().plane(60);
         assert_eq!((Some(plane.as_ptr().addr()), plane.len()), (address, 60));
-        (0..9).for_each(|_| memory.recycle(gaussians(5)));
-        assert_eq!(memory.planes().len(), 2 * (14 + 9));
-        // One that has fewer.
-        memory.recycle_integers(QuantizedFrame::zeroed(9, 0));
+        (0..9).for_each(|_| memory.recycle(gaussians(100)));
+        assert_eq!(memory.planes().len(), 2 * (PLANES + 9));
+        // One that has fewer planes, one that has none, and far smaller ones.
+        memory.recycle_integers(QuantizedFrame::zeroed(90, 0));
         assert_eq!(memory.planes().len(), 2 * PLANES);
-        // One that has none.
         memory.recycle_integers(QuantizedFrame::default());
         assert_eq!(memory.planes().len(), 2 * PLANES);
+        memory.recycle(gaussians(40));
+        assert_eq!(memory.planes().len(), PLANES + 9);
+        assert_eq!(memory.plane(10).capacity(), 10, "no plane of four times the size");
+        assert_eq!(memory.plane(41).capacity(), 41, "and none that has to grow");
         // What a clone still shows is not taken.
         let shown = gaussians(5);
-        FrameMemory::default().recycle(shown.clone());
+        memory.recycle(shown.clone());
         assert_eq!(shown, gaussians(5));
     }
 

@@ -221,7 +221,7 @@ impl StreamDecoder {
         self.interrupt = interrupt;
     }
 
-    /// Memory of frames: what is given back there is written to.
+    /// Memory of frames: later ones are decoded to what is given back here.
     pub const fn memory(&self) -> &FrameMemory {
         &self.memory
     }
@@ -317,7 +317,7 @@ impl<'a> Frames<'a> {
         self.decoder.sequence()
     }
 
-    /// Memory of frames: what is given back there is written to.
+    /// Memory of frames: later ones are decoded to what is given back here.
     pub const fn memory(&self) -> &FrameMemory {
         self.decoder.memory()
     }

@@ -1,18 +1,16 @@
 //! How far apart two scenes look: renderings of both from the same cameras.
 
 use super::flicker::{Flicker, FlickerSums};
-use crate::cameras::{BackgroundArg, CameraArgs, Views};
+use crate::cameras::{BackgroundArg, CameraArgs, Views, refuse_distorted};
 use crate::failure::Failure;
-use crate::memory_bound::{MemoryBound, PixelBytes};
+use crate::memory_bound::{MemoryBound, PixelBytes, bytes_of};
 use crate::numbers::counted;
 use crate::whole_file::read_whole;
 use clap::Args;
 use serde::Serialize;
-use splatstream_capture::LoadError;
 use splatstream_chart::table::Table;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::camera::read_views;
 use splatstream_render::metrics::{Comparison, StLpips, compare};
 use splatstream_render::{Camera, Image, Rendering, render};
 use std::path::{Path, PathBuf};
@@ -37,7 +35,7 @@ pub(crate) struct PictureArgs {
 }
 
 /// A pixel of a comparison, bytes; more with the learned metric, and with a photograph.
-const OF_COMPARISON: u64 = 64;
+const OF_COMPARISON: u64 = 112;
 const OF_LEARNED: u64 = 512;
 const OF_PHOTO: u64 = 64;
 /// A pixel of two renderings that are kept.
@@ -134,19 +132,6 @@ impl PictureArgs {
     }
 }
 
-/// Refuses cameras whose lenses bend lines: pictures are drawn without that, so that photographs differ from any scene.
-fn refuse_distorted(path: &Path) -> Result<(), Failure> {
-    let failed = |error| Failure::other(format!("{}: {error}", path.display()));
-    let views = read_views(path).map_err(failed)?.views;
-    match views.iter().find(|view| view.is_distorted) {
-        None => Ok(()),
-        Some(view) => {
-            let error = LoadError::Distorted(view.camera.name.clone());
-            Err(Failure::other(format!("{}: {error}", path.display())))
-        }
-    }
-}
-
 /// The weights of the learned metric in a file.
 pub(crate) fn read_weights(path: &Path) -> Result<StLpips, Failure> {
     Failure::refuse_standard_input(path)?;
@@ -159,16 +144,16 @@ impl Pictures<'_> {
         let Some(views) = &self.args.cameras else { return Ok(()) };
         if self.cameras.is_empty() {
             self.cameras = self.args.views.cameras(Some(views), a, &self.description)?;
+            [a, b].iter().for_each(|frame| self.memory.keep(bytes_of(frame)));
             self.of_pixel().check(&self.cameras, self.memory)?;
         }
         let background = self.args.background.colour(&self.description);
-        let before = core::mem::take(&mut self.before);
-        let mut before = before.iter();
+        let mut before = core::mem::take(&mut self.before).into_iter();
         for view in 0..self.cameras.len() {
             let Some(camera) = self.cameras.get(view) else { break };
             let drawn = [a, b].map(|frame| render(frame, camera, background));
             if let Some(before) = before.next() {
-                self.flicker.add(before, drawn.each_ref());
+                self.flicker.add(&before, drawn.each_ref());
             }
             self.compare(frame, view, &drawn)?;
             if self.is_sequence {

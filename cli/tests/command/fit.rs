@@ -52,6 +52,11 @@ fn a_sequence_is_trained_warm_measured_and_resumed() {
     fs::remove_file(&second).unwrap();
     let said = fail(2, &[fit.as_slice(), &["--resume", "--hold", "0.9"]].concat());
     assert!(said.contains("hold is 0.9, and was 0.2"), "{said}");
+    let cameras = Path::new(&walk).join("frame_0001/transforms.json");
+    let other = format!("{}\n", fs::read_to_string(&cameras).unwrap());
+    fs::write(&cameras, other).unwrap();
+    let said = fail(2, &[fit.as_slice(), &["--resume"]].concat());
+    assert!(said.contains("other inputs: there is") && said.contains("frame_0001"), "{said}");
     assert!(!second.exists());
 }
 

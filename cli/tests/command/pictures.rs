@@ -35,6 +35,18 @@ fn cameras_that_are_written_draw_another_scene_as_this_one() {
     let refused = ["render", text(&one), "--camera", camera, "-o", text(&out), "--write-cameras", camera];
     let said = fail(2, &refused);
     assert!(said.contains("ring.json"), "{said}");
+    // Nothing is written where nothing is drawn, and lenses that bend lines cannot be.
+    let (none, out) = (at("none.json"), at("f"));
+    let render = ["render", text(&one), "--write-cameras", text(&none), "-o", text(&out), "--height", "9"];
+    fail(2, &[&render[..], &["--camera", "ring:1", "--frames", "5..6"]].concat());
+    let lens = at("transforms.json");
+    let camera = r#"{"fl_x": 9, "w": 9, "h": 9, "k1": 0.1, "frames": [{"file_path": "a.png", "transform_matrix":
+        [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]}]}"#;
+    fs::write(&lens, camera).unwrap();
+    let said = fail(1, &[&render[..], &["--camera", text(&lens)]].concat());
+    assert!(said.contains("bends straight lines"), "{said}");
+    assert!(!none.exists());
+    succeed(&["render", text(&one), "--camera", text(&lens), "-o", text(&out)]);
 }
 
 #[test]

@@ -93,9 +93,11 @@ fn a_gop_can_be_made_by_itself_again_and_is_the_same() {
     let said = resume(&apart, &["--hold", "0.5"]);
     assert!(said.contains("hold is 0.5, and was 0.3") && said.contains("--force"), "{said}");
     let other = directory.path().join("other");
-    write_apart(&other, 4);
+    write_apart(&other, 5);
+    let larger = BuiltinScene { gaussians: 401, ..BuiltinScene::default() };
+    fs::write(other.join("003.ply"), ply::write(&larger.frame(0))).unwrap();
     let said = resume(&other, &[]);
-    assert!(said.contains("inputs with other names or sizes"), "{said}");
+    assert!(said.contains("other inputs: there is") && said.contains("003.ply"), "{said}");
     fs::remove_file(out.join(".track-settings.json")).unwrap();
     let said = resume(&apart, &[]);
     assert!(said.contains("no .track-settings.json"), "{said}");
@@ -103,6 +105,12 @@ fn a_gop_can_be_made_by_itself_again_and_is_the_same() {
     assert!(tracked["frames"].as_array().unwrap().iter().all(|frame| frame["kept"] == false));
     let resumed = json(&track(&apart, &out, &["--resume"]));
     assert!(resumed["frames"].as_array().unwrap().iter().all(|frame| frame["kept"] == true));
+    // Frames that another command has put there are of no settings.
+    let stream = directory.path().join("apart.gss");
+    succeed(&["encode", text(&apart), "-o", text(&stream), "--preset", "fast", "--quality", "low"]);
+    succeed(&["decode", text(&stream), "-o", text(&out), "--force"]);
+    let said = resume(&apart, &[]);
+    assert!(said.contains("no .track-settings.json"), "{said}");
 }
 
 #[test]

@@ -179,7 +179,8 @@ impl Lists {
             return core::mem::take(&mut self.planes);
         }
         let parts: Vec<&QuantizedFrame> = self.lists.iter().map(|list| &list.planes).collect();
-        let blank = context.buffers.frames.blank(0, sh_planes, context.interrupt);
+        let count = parts.iter().map(|part| part.len()).fold(0, usize::saturating_add);
+        let blank = context.buffers.frames.blank(count, sh_planes, context.interrupt);
         QuantizedFrame::joined(blank, &parts, context.interrupt)
     }
 

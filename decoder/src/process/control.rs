@@ -30,7 +30,7 @@ impl Decoder {
         };
     }
 
-    /// Memory of frames: what is given back there is written to.
+    /// Memory of frames: later ones are decoded to what is given back here.
     pub const fn memory(&self) -> &FrameMemory {
         &self.buffers.frames
     }

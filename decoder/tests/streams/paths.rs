@@ -36,6 +36,11 @@ fn what_was_in_the_memory_of_a_frame_before_changes_nothing() {
     {
         let bytes = plan.script().bytes();
         let (expected, fresh) = decoded(&bytes, &Options::default());
+        // Such as no frame has.
+        let mut junk = fresh[0].planes.clone();
+        junk.position.iter_mut().for_each(|plane| plane.fill(u32::MAX));
+        junk.signed_planes_mut().for_each(|plane| plane.fill(i32::MIN));
+        memory.recycle_integers(junk);
         let mut frames = Vec::new();
         let summary = decode_stream_to(&memory, &bytes, None, &Options::default(), |_, frame| {
             frames.push(frame.clone());

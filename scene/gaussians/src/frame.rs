@@ -362,16 +362,17 @@ impl GaussianFrame {
         Planes { position, log_scale, rotation, opacity_logit, dc, sh }
     }
 
-    /// The planes, in any order, as far as no other frame shares them: memory to be used again.
+    /// The memory of the planes, to be used again, as far as no other frame shares it. That of w of the quaternions is let go: it
+    /// follows from x, y and z, so that those who make frames of integers have no plane for it.
     pub fn into_memory(self) -> Vec<Vec<f32>> {
         let mut memory = Vec::new();
         if let Some(Places { position, opacity_logit }) = Arc::into_inner(self.places) {
             memory.extend(position);
             memory.push(opacity_logit);
         }
-        if let Some(Axes { log_scale, rotation }) = Arc::into_inner(self.axes) {
+        if let Some(Axes { log_scale, rotation: [_, x, y, z] }) = Arc::into_inner(self.axes) {
             memory.extend(log_scale);
-            memory.extend(rotation);
+            memory.extend([x, y, z]);
         }
         if let Some(Colours { dc, sh }) = Arc::into_inner(self.colours) {
             memory.extend(dc);
