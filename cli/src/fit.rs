@@ -8,11 +8,10 @@ mod training;
 use crate::cameras::BackgroundArg;
 use crate::capture_files::files_of;
 use crate::console::Console;
-use crate::decode::{frame_directory, has_frames};
 use crate::failure::Failure;
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
-use crate::memory_bound::{MemoryBound, bytes_of_gaussians};
+use crate::memory_bound::bytes_of_gaussians;
 use crate::numbers::{FrameRange, counted, parse_share};
 use crate::output_directory::OutputDirectory;
 use crate::output_file::{OutputFile, check_directory, refuse_inputs, refuse_standard};
@@ -23,7 +22,6 @@ use report::{Fitted, FittedFrame};
 use splatstream_files::ply;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
-use splatstream_render::Camera;
 use splatstream_render::camera::{Capture, CapturedView};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -209,13 +207,7 @@ impl Fit {
     fn directory(&self, captures: &Captures, inputs: &[PathBuf]) -> Result<Option<OutputDirectory>, Failure> {
         let out = self.out.as_deref().filter(|_| captures.is_sequence());
         let Some(out) = out else { return Ok(None) };
-        let settings = self.kept_settings(captures)?;
-        if self.resume {
-            return settings.resume(out, inputs, has_frames).map(Some);
-        }
-        let mut directory = frame_directory(out, inputs, self.force)?;
-        settings.write(&mut directory)?;
-        Ok(Some(directory))
+        self.kept_settings(captures)?.directory(out, inputs, self.resume, self.force).map(Some)
     }
 
     /// The frame of a start that belongs to a capture.
@@ -263,7 +255,7 @@ impl Fit {
         let asked = kept.saturating_add(read.max(drawn.saturating_add(others)));
         let name = path.display();
         let (views, many) = (counted(sizes.len() as u64, "picture"), counted(gaussians, "Gaussian"));
-        MemoryBound::of(self.limits.memory()).check(
+        self.limits.bound().check(
             asked,
             &format!("{name}: training {many} with {views}"),
             "fewer --gaussians and a smaller --height take less",
@@ -272,9 +264,9 @@ impl Fit {
 
     /// Pixels of a picture, and of that which is made of it.
     fn pixels(&self, CapturedView { camera, .. }: &CapturedView) -> [u64; 2] {
-        let of = |camera: &Camera| u64::from(camera.width).saturating_mul(camera.height.into());
         let smaller = self.height.filter(|&height| height < camera.height);
-        [of(camera), smaller.map_or_else(|| of(camera), |height| of(&camera.scaled_to_height(height)))]
+        let made = smaller.map_or_else(|| camera.pixels(), |height| camera.scaled_to_height(height).pixels());
+        [camera.pixels(), made]
     }
 
     /// Trains a frame, whose file replaces no file of the capture and none of `inputs`.

@@ -3,6 +3,7 @@
 use crate::failure::{Failure, Instead};
 use crate::input_args::parse_size;
 use crate::machine;
+use crate::memory_bound::MemoryBound;
 use crate::standard::STANDARD;
 use clap::Args;
 use splatstream_decoder::operating_point::OperatingPoint;
@@ -59,9 +60,9 @@ impl LimitArgs {
         self.size.limits()
     }
 
-    /// Bytes of memory that are asked for, or that there are.
-    pub(crate) fn memory(&self) -> u64 {
-        self.max_memory.unwrap_or_else(machine::memory)
+    /// The bound on memory that is asked for, or what there is.
+    pub(crate) fn bound(&self) -> MemoryBound {
+        MemoryBound::of(self.max_memory.unwrap_or_else(machine::memory))
     }
 
     /// How to decode: all of a stream, within the limits and the memory asked for, or that there is.

@@ -61,14 +61,14 @@ pub(super) struct PictureErrors {
 }
 
 /// One picture.
-#[derive(Serialize, Clone)]
+#[derive(Serialize)]
 struct PictureError {
     frame: u32,
     view: String,
     #[serde(flatten)]
-    rendered: Figures,
+    rendered: Comparison,
     #[serde(skip_serializing_if = "Option::is_none")]
-    photos: Option<[Figures; 2]>,
+    photos: Option<[Comparison; 2]>,
 }
 
 /// The figures of a comparison, all of them null where there is none.
@@ -89,9 +89,9 @@ pub(super) struct Pictures<'a> {
     description: SceneDescription,
     learned: Option<StLpips>,
     cameras: Vec<Camera>,
-    rendered: Vec<Comparison>,
-    photos: [Vec<Comparison>; 2],
     each: Vec<PictureError>,
+    /// A and B against photographs, blank pictures too.
+    photos: [Vec<Comparison>; 2],
     /// What pictures may take.
     memory: MemoryBound,
     /// Whether there may be more than one frame.
@@ -120,9 +120,8 @@ impl PictureArgs {
             description,
             learned,
             cameras: Vec::new(),
-            rendered: Vec::new(),
-            photos,
             each: Vec::new(),
+            photos,
             memory,
             is_sequence,
             before: Vec::new(),
@@ -149,17 +148,18 @@ impl Pictures<'_> {
         }
         let background = self.args.background.colour(&self.description);
         let mut before = core::mem::take(&mut self.before).into_iter();
-        for view in 0..self.cameras.len() {
-            let Some(camera) = self.cameras.get(view) else { break };
+        let cameras = core::mem::take(&mut self.cameras);
+        for camera in &cameras {
             let drawn = [a, b].map(|frame| render(frame, camera, background));
             if let Some(before) = before.next() {
                 self.flicker.add(&before, drawn.each_ref());
             }
-            self.compare(frame, view, &drawn)?;
+            self.compare(frame, camera, &drawn)?;
             if self.is_sequence {
                 self.before.push(drawn);
             }
         }
+        self.cameras = cameras;
         Ok(())
     }
 
@@ -171,9 +171,8 @@ impl Pictures<'_> {
         PixelBytes { of_one: OF_COMPARISON + learned + photo, of_each }
     }
 
-    /// Compares the renderings of a frame from one of the cameras, with each other and with a photograph.
-    fn compare(&mut self, frame: u32, view: usize, [a, b]: &[Rendering; 2]) -> Result<(), Failure> {
-        let Some(camera) = self.cameras.get(view) else { return Ok(()) };
+    /// Compares the renderings of a frame from a camera, with each other and with a photograph.
+    fn compare(&mut self, frame: u32, camera: &Camera, [a, b]: &[Rendering; 2]) -> Result<(), Failure> {
         let learned = self.learned.as_ref();
         let photos = match &self.args.photos {
             Some(directory) => {
@@ -191,25 +190,20 @@ impl Pictures<'_> {
             self.blank += 1;
             return Ok(());
         }
-        let compared = compare(&a.colour, &a.alpha, &b.colour, learned);
-        self.rendered.push(compared);
-        self.each.push(PictureError {
-            frame,
-            view: camera.name.clone(),
-            rendered: compared.into(),
-            photos: photos.map(|photos| photos.map(Figures::from)),
-        });
+        let rendered = compare(&a.colour, &a.alpha, &b.colour, learned);
+        self.each.push(PictureError { frame, view: camera.name.clone(), rendered, photos });
         Ok(())
     }
 
     /// Means over everything that was added.
-    pub(super) fn errors(&self) -> PictureErrors {
+    pub(super) fn errors(self) -> PictureErrors {
+        let rendered: Vec<Comparison> = self.each.iter().map(|picture| picture.rendered).collect();
         PictureErrors {
-            rendered: Figures::of(&self.rendered),
+            rendered: Figures::of(&rendered),
             photos: self.args.photos.as_ref().map(|_| self.photos.each_ref().map(|list| Figures::of(list))),
             flicker: self.flicker.means(),
-            pictures: self.rendered.len(),
-            each_picture: self.each.clone(),
+            pictures: self.each.len(),
+            each_picture: self.each,
             blank_pictures: self.blank,
         }
     }
@@ -239,7 +233,15 @@ fn read_photo(directory: &Path, camera: &Camera) -> Result<Image, Failure> {
 
 impl Figures {
     fn of(pictures: &[Comparison]) -> Self {
-        Comparison::mean(pictures).map(Self::from).unwrap_or_default()
+        let Some(mean) = Comparison::mean(pictures) else { return Self::default() };
+        Self {
+            psnr_db: Some(mean.psnr_db),
+            psnr_masked_db: mean.psnr_masked_db,
+            yuv_psnr_db: Some(mean.yuv_psnr_db),
+            ssim: mean.ssim,
+            ssim_masked: mean.ssim_masked,
+            st_lpips: mean.st_lpips,
+        }
     }
 
     fn row(&self, what: &str) -> [String; 7] {
@@ -255,19 +257,6 @@ impl Figures {
             cell(self.ssim_masked, 4),
             cell(self.st_lpips, 4),
         ]
-    }
-}
-
-impl From<Comparison> for Figures {
-    fn from(compared: Comparison) -> Self {
-        Self {
-            psnr_db: Some(compared.psnr_db),
-            psnr_masked_db: compared.psnr_masked_db,
-            yuv_psnr_db: Some(compared.yuv_psnr_db),
-            ssim: compared.ssim,
-            ssim_masked: compared.ssim_masked,
-            st_lpips: compared.st_lpips,
-        }
     }
 }
 
@@ -308,7 +297,7 @@ impl PictureErrors {
 
     /// Which of several pictures is worst.
     fn lowest(&self) -> String {
-        let of = |picture: &PictureError| picture.rendered.psnr_db.unwrap_or(f64::INFINITY);
+        let of = |picture: &PictureError| picture.rendered.psnr_db;
         let worst = self.each_picture.iter().min_by(|a, b| of(a).total_cmp(&of(b)));
         match worst {
             Some(worst) if self.each_picture.len() > 1 => {
