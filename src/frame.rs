@@ -144,8 +144,14 @@ impl Frame {
     /// The Gaussians as f32. Whoever gives them back to [`Decoder::recycle`](crate::Decoder::recycle) saves the next frame fresh
     /// memory.
     pub fn into_gaussians(mut self) -> GaussianFrame {
-        let gaussians = self.gaussians.take();
-        gaussians.unwrap_or_else(|| computed(core::mem::take(&mut self.integers), &self.sequence))
+        let integers = core::mem::take(&mut self.integers);
+        match self.gaussians.take() {
+            Some(gaussians) => {
+                self.integers = integers;
+                gaussians
+            }
+            None => computed(integers, &self.sequence),
+        }
     }
 
     /// The Gaussians as integers on the grids of the stream.

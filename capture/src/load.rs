@@ -177,7 +177,7 @@ impl<'a> FoundPicture<'a> {
             Ok(camera) => camera,
             Err(error) => return Err(LoadError::Size { path, error }),
         };
-        let pixels = camera.pixels();
+        let pixels = u64::from(camera.width).saturating_mul(camera.height.into());
         let bytes = pixels.saturating_mul(Image::DECODING_BYTES).saturating_add(length);
         Ok(Self { view, path, camera, bytes })
     }

@@ -10,6 +10,7 @@ use crate::console::Console;
 use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
+use crate::memory_bound::MemoryBound;
 use crate::numbers::counted;
 use crate::progress::Progress;
 use crate::standard::STANDARD;
@@ -100,8 +101,8 @@ impl Compare {
             opened_a.description(&options.limits).or_else(|| opened_b.description(&options.limits));
         // 0 where it is not known.
         let is_sequence = [&frames_a, &frames_b].iter().all(|frames| frames.expected() != 1);
-        let description = description.unwrap_or_default();
-        let mut pictures = self.pictures.start(description, self.limits.bound(), is_sequence)?;
+        let memory = MemoryBound::of(self.limits.memory());
+        let mut pictures = self.pictures.start(description.unwrap_or_default(), memory, is_sequence)?;
         self.frames([&mut frames_a, &mut frames_b], &mut report, &mut sums, &mut pictures)?;
         report.pairs = sums.pairs();
         report.attributes = sums.errors();

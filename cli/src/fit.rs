@@ -8,10 +8,11 @@ mod training;
 use crate::cameras::BackgroundArg;
 use crate::capture_files::files_of;
 use crate::console::Console;
+use crate::decode::{frame_directory, has_frames};
 use crate::failure::Failure;
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
-use crate::memory_bound::bytes_of_gaussians;
+use crate::memory_bound::{MemoryBound, bytes_of_gaussians};
 use crate::numbers::{FrameRange, counted, parse_share};
 use crate::output_directory::OutputDirectory;
 use crate::output_file::{OutputFile, check_directory, refuse_inputs, refuse_standard};
@@ -22,6 +23,7 @@ use report::{Fitted, FittedFrame};
 use splatstream_files::ply;
 use splatstream_format::payload::SceneDescription;
 use splatstream_gaussians::GaussianFrame;
+use splatstream_render::Camera;
 use splatstream_render::camera::{Capture, CapturedView};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -207,7 +209,13 @@ impl Fit {
     fn directory(&self, captures: &Captures, inputs: &[PathBuf]) -> Result<Option<OutputDirectory>, Failure> {
         let out = self.out.as_deref().filter(|_| captures.is_sequence());
         let Some(out) = out else { return Ok(None) };
-        self.kept_settings(captures)?.directory(out, inputs, self.resume, self.force).map(Some)
+        let settings = self.kept_settings(captures)?;
+        if self.resume {
+            return settings.resume(out, inputs, has_frames).map(Some);
+        }
+        let mut directory = frame_directory(out, inputs, self.force)?;
+        settings.write(&mut directory)?;
+        Ok(Some(directory))
     }
 
     /// The frame of a start that belongs to a capture.
@@ -255,7 +263,7 @@ impl Fit {
         let asked = kept.saturating_add(read.max(drawn.saturating_add(others)));
         let name = path.display();
         let (views, many) = (counted(sizes.len() as u64, "picture"), counted(gaussians, "Gaussian"));
-        self.limits.bound().check(
+        MemoryBound::of(self.limits.memory()).check(
             asked,
             &format!("{name}: training {many} with {views}"),
             "fewer --gaussians and a smaller --height take less",
@@ -264,9 +272,9 @@ impl Fit {
 
     /// Pixels of a picture, and of that which is made of it.
     fn pixels(&self, CapturedView { camera, .. }: &CapturedView) -> [u64; 2] {
+        let of = |camera: &Camera| u64::from(camera.width).saturating_mul(camera.height.into());
         let smaller = self.height.filter(|&height| height < camera.height);
-        let made = smaller.map_or_else(|| camera.pixels(), |height| camera.scaled_to_height(height).pixels());
-        [camera.pixels(), made]
+        [of(camera), smaller.map_or_else(|| of(camera), |height| of(&camera.scaled_to_height(height)))]
     }
 
     /// Trains a frame, whose file replaces no file of the capture and none of `inputs`.

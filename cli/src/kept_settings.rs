@@ -1,9 +1,8 @@
 //! The settings that the frames in a directory were made with, in a hidden file beside them. A run that keeps frames of an earlier
 //! one must have the same: otherwise the frames of one sequence would be made in two ways, and nothing would say so.
 
-use crate::decode::{frame_directory, has_frames};
 use crate::failure::Failure;
-use crate::output_directory::{OutputDirectory, settings_file};
+use crate::output_directory::OutputDirectory;
 use crate::output_file::OutputFile;
 use crate::unfinished::files_below;
 use crate::whole_file::read_text;
@@ -49,29 +48,24 @@ impl KeptSettings {
         let Value::Object(settings) = value else {
             return Err(Failure::other(format!("the settings of {command} have no names")));
         };
-        Ok(Self { file: settings_file(command), settings })
+        Ok(Self { file: file_of(command), settings })
     }
 
-    /// The directory of frames that are made with them: one with frames of an earlier run, which this one goes on with (`resume`),
-    /// or one for frames in the places of those (`force`). Inputs may have been added since.
-    pub(crate) fn directory(
+    /// Writes them, before the first frame.
+    pub(crate) fn write(&self, directory: &mut OutputDirectory) -> Result<(), Failure> {
+        directory.write(&self.file, self.text().as_bytes())
+    }
+
+    /// The directory of an earlier run with the same settings, which goes on. `frames`: what it has left. Inputs may have been
+    /// added since.
+    pub(crate) fn resume(
         &self,
         path: &Path,
         inputs: &[PathBuf],
-        resume: bool,
-        force: bool,
+        frames: impl FnOnce(&Path) -> bool,
     ) -> Result<OutputDirectory, Failure> {
-        if resume {
-            return self.resume(path, inputs);
-        }
-        let mut directory = frame_directory(path, inputs, force)?;
-        directory.write(&self.file, self.text().as_bytes())?;
-        Ok(directory)
-    }
-
-    fn resume(&self, path: &Path, inputs: &[PathBuf]) -> Result<OutputDirectory, Failure> {
         let directory = OutputDirectory::resumed(path, inputs)?;
-        let (file, has_frames) = (path.join(&self.file), has_frames(path));
+        let (file, has_frames) = (path.join(&self.file), frames(path));
         if !file.exists() && has_frames {
             return Err(Failure::Usage(format!(
                 "{}: it has frames, but no {}, so that nobody knows what they were made with\n  \
@@ -127,6 +121,16 @@ impl KeptSettings {
         let text = serde_json::to_string_pretty(&self.settings).unwrap_or_default();
         format!("{text}\n")
     }
+}
+
+/// The names of such files in a directory that others are written to: they are of frames that are no longer there.
+pub(crate) fn settings_in(directory: &Path) -> impl Iterator<Item = PathBuf> {
+    let paths = ["fit", "track"].map(|command| directory.join(file_of(command)));
+    paths.into_iter().filter(|path| path.is_file())
+}
+
+fn file_of(command: &str) -> String {
+    format!(".{command}-settings.json")
 }
 
 #[cfg(test)]

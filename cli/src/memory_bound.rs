@@ -79,10 +79,11 @@ pub(crate) struct PixelBytes {
 impl PixelBytes {
     /// Refuses cameras whose pictures take more than there is.
     pub(crate) fn check(self, cameras: &[Camera], bound: MemoryBound) -> Result<(), Failure> {
-        let Some(largest) = cameras.iter().max_by_key(|camera| camera.pixels()) else { return Ok(()) };
-        let all = cameras.iter().map(Camera::pixels).fold(0, u64::saturating_add);
+        let pixels = |camera: &Camera| u64::from(camera.width).saturating_mul(camera.height.into());
+        let Some(largest) = cameras.iter().max_by_key(|camera| pixels(camera)) else { return Ok(()) };
+        let all = cameras.iter().map(pixels).fold(0, u64::saturating_add);
         let asked =
-            largest.pixels().saturating_mul(self.of_one).saturating_add(all.saturating_mul(self.of_each));
+            pixels(largest).saturating_mul(self.of_one).saturating_add(all.saturating_mul(self.of_each));
         let (many, width, height) = (counted(cameras.len() as u64, "picture"), largest.width, largest.height);
         let what = format!("drawing {many} of up to {width} x {height} pixels");
         bound.check(asked, &what, "a smaller --height and fewer cameras take less")

@@ -61,17 +61,16 @@ impl OutputDirectory {
         !self.earlier.is_empty()
     }
 
-    /// What says with which settings frames were made goes with those of the earlier run, or at once where none are left.
-    pub(crate) fn replace_settings(&mut self) -> Result<(), Failure> {
-        let paths = ["fit", "track"].map(|command| self.path_of(settings_file(command)));
-        let mut files = paths.into_iter().filter(|path| path.is_file());
+    /// Files that go with those of the earlier run, or at once where it has left no others.
+    pub(crate) fn replace_too(&mut self, files: impl Iterator<Item = PathBuf>) -> Result<(), Failure> {
         if self.replaces() {
             self.earlier.extend(files);
             return Ok(());
         }
-        files.try_for_each(|file| {
+        let remove = |file: PathBuf| {
             std::fs::remove_file(&file).map_err(|error| Failure::file("remove", &file, &error))
-        })
+        };
+        files.into_iter().try_for_each(remove)
     }
 
     /// The directory.
@@ -129,11 +128,6 @@ impl OutputDirectory {
         }
         Ok(())
     }
-}
-
-/// The name of the file in which a command keeps the settings of frames, beside them.
-pub(crate) fn settings_file(command: &str) -> String {
-    format!(".{command}-settings.json")
 }
 
 /// Refuses a file in a directory below another that is on another disk, as a link may lead there: it could not be moved, which would

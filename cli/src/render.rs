@@ -7,7 +7,7 @@ use crate::failure::{Failure, StreamFault, faults_text};
 use crate::frame_name::{frame_name, is_frame_name};
 use crate::frames::{Frames, Opened};
 use crate::input_args::InputArgs;
-use crate::memory_bound::{PixelBytes, bytes_of};
+use crate::memory_bound::{MemoryBound, PixelBytes, bytes_of};
 use crate::numbers::{FrameRange, counted, frames};
 use crate::output_directory::{OutputDirectory, files_in, is_numbered};
 use crate::output_file::{OutputFile, check_directory, refuse_inputs, refuse_standard};
@@ -155,11 +155,12 @@ impl Render {
 
     /// Refuses cameras to be written that are no file, or none of pinholes.
     fn check_cameras_file(&self) -> Result<(), Failure> {
-        let Some(path) = &self.write_cameras else { return Ok(()) };
-        refuse_standard(path)?;
-        match &self.camera {
-            Some(Views::File(cameras)) => refuse_distorted(cameras),
-            _ => Ok(()),
+        match (&self.write_cameras, &self.camera) {
+            (Some(path), Some(Views::File(cameras))) => {
+                refuse_standard(path).and_then(|()| refuse_distorted(cameras))
+            }
+            (Some(path), _) => refuse_standard(path),
+            (None, _) => Ok(()),
         }
     }
 
@@ -203,10 +204,11 @@ impl Render {
         inputs: &[PathBuf],
     ) -> Result<Drawing, Failure> {
         let cameras = named(self.cameras.cameras(self.camera.as_ref(), first, description)?);
-        let mut memory = self.limits.bound();
+        let mut memory = MemoryBound::of(self.limits.memory());
         memory.keep(bytes_of(first));
         OF_PIXEL.check(&cameras, memory)?;
-        self.write_cameras.iter().try_for_each(|path| refuse_inputs(path, inputs))?;
+        let cameras_file = self.write_cameras.as_ref().map(|path| refuse_inputs(path, inputs));
+        cameras_file.unwrap_or(Ok(()))?;
         let pictures = |out: &Path| files_in(out, |path| is_picture(path, &cameras));
         let directory = OutputDirectory::new(&self.out, pictures, "pictures", inputs, self.force)?;
         Ok(Drawing { cameras, background: self.background.colour(description), directory })

@@ -3,7 +3,6 @@
 use crate::failure::{Failure, Instead};
 use crate::input_args::parse_size;
 use crate::machine;
-use crate::memory_bound::MemoryBound;
 use crate::standard::STANDARD;
 use clap::Args;
 use splatstream_decoder::operating_point::OperatingPoint;
@@ -60,9 +59,9 @@ impl LimitArgs {
         self.size.limits()
     }
 
-    /// The bound on memory that is asked for, or what there is.
-    pub(crate) fn bound(&self) -> MemoryBound {
-        MemoryBound::of(self.max_memory.unwrap_or_else(machine::memory))
+    /// Bytes of memory that are asked for, or that there are.
+    pub(crate) fn memory(&self) -> u64 {
+        self.max_memory.unwrap_or_else(machine::memory)
     }
 
     /// How to decode: all of a stream, within the limits and the memory asked for, or that there is.

@@ -5,6 +5,7 @@ mod settings;
 
 use crate::cameras::{BackgroundArg, CameraArgs, UpName, Views};
 use crate::console::Console;
+use crate::decode::{frame_directory, has_frames};
 use crate::failure::Failure;
 use crate::frame_files::FrameFiles;
 use crate::frame_name::frame_name;
@@ -106,8 +107,7 @@ impl Track {
         let inputs = self.files_read(&files);
         check_directory(&self.out, "frames of a sequence")?;
         let span = self.span(files.len())?;
-        let mut directory =
-            self.kept_settings(&files)?.directory(&self.out, &inputs, self.resume, self.force)?;
+        let mut directory = self.directory(&files, &inputs)?;
         let first = span.first - span.first % self.gop;
         let mut report = Tracked::new(self.out.clone());
         let mut settings = Following::default();
@@ -134,6 +134,17 @@ impl Track {
         files.warnings().iter().for_each(|warning| console.complain(&warning.text()));
         report.finish(begin.elapsed());
         console.report(&report, || report.text())
+    }
+
+    /// The directory of the frames, with the settings of this run.
+    fn directory(&self, files: &FrameFiles, inputs: &[PathBuf]) -> Result<OutputDirectory, Failure> {
+        let settings = self.kept_settings(files)?;
+        if self.resume {
+            return settings.resume(&self.out, inputs, has_frames);
+        }
+        let mut directory = frame_directory(&self.out, inputs, self.force)?;
+        settings.write(&mut directory)?;
+        Ok(directory)
     }
 
     /// The frames to make, of so many that there are.

@@ -44,6 +44,11 @@ pub struct BufferPool {
 }
 
 impl BufferPool {
+    /// Without buffers, and with memory of frames.
+    pub(crate) fn new(frames: FrameMemory) -> Self {
+        Self { idle: Mutex::default(), frames }
+    }
+
     fn idle(&self) -> MutexGuard<'_, Vec<Buffers>> {
         self.idle.lock().unwrap_or_else(PoisonError::into_inner)
     }

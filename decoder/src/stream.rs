@@ -334,7 +334,7 @@ pub fn decode_stream(
     options: &Options,
     on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
-    decode_stream_to(&FrameMemory::default(), bytes, None, options, on_frame)
+    run(Frames::open(bytes, options), on_frame)
 }
 
 /// The same from a GOP on, see [`Frames::open_inside`].
@@ -344,7 +344,7 @@ pub fn decode_stream_inside(
     options: &Options,
     on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
-    decode_stream_to(&FrameMemory::default(), bytes, Some(gop), options, on_frame)
+    run(Frames::open_inside(bytes, gop, options), on_frame)
 }
 
 /// The same from a GOP on if one is given, to memory that whoever needs a frame no more gives it back to.
@@ -367,17 +367,24 @@ pub fn decode_stream_to(
     bytes: &[u8],
     gop: Option<u64>,
     options: &Options,
-    mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+    on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
 ) -> Summary {
-    let opened = match gop {
+    let mut frames = match gop {
         None => Frames::open(bytes, options),
         Some(gop) => Frames::open_inside(bytes, gop, options),
     };
-    let mut frames = match opened {
+    frames.iter_mut().for_each(|frames| frames.decoder.set_memory(memory.clone()));
+    run(frames, on_frame)
+}
+
+fn run(
+    frames: Result<Frames<'_>>,
+    mut on_frame: impl FnMut(&SequenceParameters, DecodedFrame) -> ControlFlow<()>,
+) -> Summary {
+    let mut frames = match frames {
         Ok(frames) => frames,
         Err(error) => return Summary { errors: vec![error], ..Summary::default() },
     };
-    frames.decoder.set_memory(memory.clone());
     while let Some(frame) = frames.next_frame() {
         let Some(sequence) = frames.sequence() else { break };
         if on_frame(sequence, frame).is_break() {

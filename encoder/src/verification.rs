@@ -122,18 +122,18 @@ impl Verifier {
         let memory = decoder.memory().clone();
         let mut found: [Option<DecodedFrame>; 3] = [const { None }; 3];
         let mut take = |frame: DecodedFrame| {
-            let [intra, predicted, enhancement] = &mut found;
-            let slot = match frame.frame_type {
-                FrameType::Intra => intra,
-                FrameType::Predicted => predicted,
-                FrameType::Enhancement => enhancement,
-            };
-            let is_wanted = match taken {
-                Taken::OfEachType => true,
-                Taken::Only(one) => one == frame.index,
-            };
-            let unneeded = if is_wanted { slot.replace(frame) } else { Some(frame) };
-            unneeded.into_iter().for_each(|frame| memory.recycle_integers(frame.planes));
+            if matches!(taken, Taken::OfEachType) || matches!(taken, Taken::Only(one) if one == frame.index) {
+                let [intra, predicted, enhancement] = &mut found;
+                let slot = match frame.frame_type {
+                    FrameType::Intra => intra,
+                    FrameType::Predicted => predicted,
+                    FrameType::Enhancement => enhancement,
+                };
+                let before = slot.replace(frame);
+                before.into_iter().for_each(|frame| memory.recycle_integers(frame.planes));
+            } else {
+                memory.recycle_integers(frame.planes);
+            }
         };
         let mut units = stream.units();
         // These bytes have no end unit.

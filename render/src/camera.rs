@@ -89,12 +89,6 @@ impl Camera {
         2.0 * libm::atanf(0.5 * self.height as f32 / self.focal[1])
     }
 
-    /// Pixels of a picture.
-    #[must_use]
-    pub fn pixels(&self) -> u64 {
-        u64::from(self.width).saturating_mul(self.height.into())
-    }
-
     /// The same view in a picture of `height` rows; the width follows, rounded to the nearest pixel.
     #[must_use]
     #[expect(clippy::indexing_slicing, reason = "axes are 0 and 1")]

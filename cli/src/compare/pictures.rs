@@ -61,14 +61,14 @@ pub(super) struct PictureErrors {
 }
 
 /// One picture.
-#[derive(Serialize)]
+#[derive(Serialize, Clone)]
 struct PictureError {
     frame: u32,
     view: String,
     #[serde(flatten)]
-    rendered: Comparison,
+    rendered: Figures,
     #[serde(skip_serializing_if = "Option::is_none")]
-    photos: Option<[Comparison; 2]>,
+    photos: Option<[Figures; 2]>,
 }
 
 /// The figures of a comparison, all of them null where there is none.
@@ -89,9 +89,9 @@ pub(super) struct Pictures<'a> {
     description: SceneDescription,
     learned: Option<StLpips>,
     cameras: Vec<Camera>,
-    each: Vec<PictureError>,
-    /// A and B against photographs, blank pictures too.
+    rendered: Vec<Comparison>,
     photos: [Vec<Comparison>; 2],
+    each: Vec<PictureError>,
     /// What pictures may take.
     memory: MemoryBound,
     /// Whether there may be more than one frame.
@@ -120,8 +120,9 @@ impl PictureArgs {
             description,
             learned,
             cameras: Vec::new(),
-            each: Vec::new(),
+            rendered: Vec::new(),
             photos,
+            each: Vec::new(),
             memory,
             is_sequence,
             before: Vec::new(),
@@ -148,18 +149,17 @@ impl Pictures<'_> {
         }
         let background = self.args.background.colour(&self.description);
         let mut before = core::mem::take(&mut self.before).into_iter();
-        let cameras = core::mem::take(&mut self.cameras);
-        for camera in &cameras {
+        for view in 0..self.cameras.len() {
+            let Some(camera) = self.cameras.get(view) else { break };
             let drawn = [a, b].map(|frame| render(frame, camera, background));
             if let Some(before) = before.next() {
                 self.flicker.add(&before, drawn.each_ref());
             }
-            self.compare(frame, camera, &drawn)?;
+            self.compare(frame, view, &drawn)?;
             if self.is_sequence {
                 self.before.push(drawn);
             }
         }
-        self.cameras = cameras;
         Ok(())
     }
 
@@ -171,8 +171,9 @@ impl Pictures<'_> {
         PixelBytes { of_one: OF_COMPARISON + learned + photo, of_each }
     }
 
-    /// Compares the renderings of a frame from a camera, with each other and with a photograph.
-    fn compare(&mut self, frame: u32, camera: &Camera, [a, b]: &[Rendering; 2]) -> Result<(), Failure> {
+    /// Compares the renderings of a frame from one of the cameras, with each other and with a photograph.
+    fn compare(&mut self, frame: u32, view: usize, [a, b]: &[Rendering; 2]) -> Result<(), Failure> {
+        let Some(camera) = self.cameras.get(view) else { return Ok(()) };
         let learned = self.learned.as_ref();
         let photos = match &self.args.photos {
             Some(directory) => {
@@ -190,20 +191,25 @@ impl Pictures<'_> {
             self.blank += 1;
             return Ok(());
         }
-        let rendered = compare(&a.colour, &a.alpha, &b.colour, learned);
-        self.each.push(PictureError { frame, view: camera.name.clone(), rendered, photos });
+        let compared = compare(&a.colour, &a.alpha, &b.colour, learned);
+        self.rendered.push(compared);
+        self.each.push(PictureError {
+            frame,
+            view: camera.name.clone(),
+            rendered: compared.into(),
+            photos: photos.map(|photos| photos.map(Figures::from)),
+        });
         Ok(())
     }
 
     /// Means over everything that was added.
-    pub(super) fn errors(self) -> PictureErrors {
-        let rendered: Vec<Comparison> = self.each.iter().map(|picture| picture.rendered).collect();
+    pub(super) fn errors(&self) -> PictureErrors {
         PictureErrors {
-            rendered: Figures::of(&rendered),
+            rendered: Figures::of(&self.rendered),
             photos: self.args.photos.as_ref().map(|_| self.photos.each_ref().map(|list| Figures::of(list))),
             flicker: self.flicker.means(),
-            pictures: self.each.len(),
-            each_picture: self.each,
+            pictures: self.rendered.len(),
+            each_picture: self.each.clone(),
             blank_pictures: self.blank,
         }
     }
@@ -233,15 +239,7 @@ fn read_photo(directory: &Path, camera: &Camera) -> Result<Image, Failure> {
 
 impl Figures {
     fn of(pictures: &[Comparison]) -> Self {
-        let Some(mean) = Comparison::mean(pictures) else { return Self::default() };
-        Self {
-            psnr_db: Some(mean.psnr_db),
-            psnr_masked_db: mean.psnr_masked_db,
-            yuv_psnr_db: Some(mean.yuv_psnr_db),
-            ssim: mean.ssim,
-            ssim_masked: mean.ssim_masked,
-            st_lpips: mean.st_lpips,
-        }
+        Comparison::mean(pictures).map(Self::from).unwrap_or_default()
     }
 
     fn row(&self, what: &str) -> [String; 7] {
@@ -257,6 +255,19 @@ impl Figures {
             cell(self.ssim_masked, 4),
             cell(self.st_lpips, 4),
         ]
+    }
+}
+
+impl From<Comparison> for Figures {
+    fn from(compared: Comparison) -> Self {
+        Self {
+            psnr_db: Some(compared.psnr_db),
+            psnr_masked_db: compared.psnr_masked_db,
+            yuv_psnr_db: Some(compared.yuv_psnr_db),
+            ssim: compared.ssim,
+            ssim_masked: compared.ssim_masked,
+            st_lpips: compared.st_lpips,
+        }
     }
 }
 
@@ -297,7 +308,7 @@ impl PictureErrors {
 
     /// Which of several pictures is worst.
     fn lowest(&self) -> String {
-        let of = |picture: &PictureError| picture.rendered.psnr_db;
+        let of = |picture: &PictureError| picture.rendered.psnr_db.unwrap_or(f64::INFINITY);
         let worst = self.each_picture.iter().min_by(|a, b| of(a).total_cmp(&of(b)));
         match worst {
             Some(worst) if self.each_picture.len() > 1 => {

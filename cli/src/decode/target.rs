@@ -5,6 +5,7 @@ use super::format::Format;
 use crate::encode::warnings::Warning;
 use crate::failure::Failure;
 use crate::frame_name::{frame_name, is_frame_name};
+use crate::kept_settings::settings_in;
 use crate::output_directory::{OutputDirectory, files_in};
 use crate::output_file::{OutputFile, ends_with_separator, refuse_terminal};
 use crate::standard::{STANDARD, is_standard};
@@ -160,7 +161,7 @@ pub(crate) fn frame_directory(
     force: bool,
 ) -> Result<OutputDirectory, Failure> {
     let mut directory = OutputDirectory::new(path, |path| files_in(path, is_frame), "frames", inputs, force)?;
-    directory.replace_settings()?;
+    directory.replace_too(settings_in(path))?;
     Ok(directory)
 }
 

@@ -4,6 +4,7 @@ use super::Decoder;
 use super::frame::{DividedUnit, Refused};
 use super::phase::Phase;
 use crate::budget::Shape;
+use crate::buffers::BufferPool;
 use crate::frame_memory::FrameMemory;
 use crate::interrupt::Interrupt;
 use crate::operating_point::OperatingPoint;
@@ -16,7 +17,6 @@ impl Decoder {
         let sequence = self.sequence.take();
         let phase = if sequence.is_some() { Phase::Sequence } else { Phase::Start };
         let tally = self.tally.restarted();
-        let buffers = core::mem::take(&mut self.buffers);
         *self = Self {
             starts_inside: true,
             phase,
@@ -25,7 +25,7 @@ impl Decoder {
             wanted_point: self.wanted_point,
             interrupt: self.interrupt.clone(),
             next_identity: self.next_identity,
-            buffers,
+            buffers: BufferPool::new(self.memory().clone()),
             ..Self::with(self.profile, self.options)
         };
     }

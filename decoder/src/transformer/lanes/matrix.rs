@@ -43,7 +43,6 @@ impl Matrix {
     }
 
     /// As [`Self::multiply`], with other biases.
-    // In modules for web pages a function of its own: its seven callers, with all that they call, were one of 75 KB.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     pub(super) fn multiply_from<P: Products>(
